@@ -1,0 +1,22 @@
+//! Every value against its allowed range, so that a wrong unit or sign stops at the door.
+
+mod contradictions;
+mod ranges;
+
+use super::{ParameterError, VehicleParameters};
+
+impl VehicleParameters {
+    /// Checks every value against its range, and that the values fit together.
+    ///
+    /// # Errors
+    /// [`ParameterError::OutOfRange`] or [`ParameterError::Contradiction`], naming the vehicle.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        self.check_as(&format!("vehicle `{}`", self.name))
+    }
+
+    /// As [`VehicleParameters::check`], with messages that name `origin`.
+    pub(super) fn check_as(&self, origin: &str) -> Result<(), ParameterError> {
+        ranges::check(self, origin)?;
+        contradictions::check(self, origin)
+    }
+}

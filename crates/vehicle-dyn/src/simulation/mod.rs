@@ -1,0 +1,319 @@
+//! Running a vehicle: fixed-step RK4, 1 ms by default, ten steps to a control tick of 10 ms.
+//!
+//! The same inputs give the same bits on every run. Nothing is allocated while stepping.
+
+mod diagnostics;
+mod dynamics;
+mod observation;
+mod observe;
+mod settle;
+mod state;
+
+pub use diagnostics::{Energy, Momentum};
+pub use observation::Observation;
+pub use state::State;
+
+use nalgebra::Vector3;
+
+use crate::parameters::{ParameterError, VehicleParameters};
+use crate::terrain::Terrain;
+use crate::units::{DEGREE, KMH, wrap_angle};
+use dynamics::{Dynamics, HeldInput};
+
+/// Integration step unless another is asked for, s.
+pub const DEFAULT_SUBSTEP_S: f64 = 1e-3;
+/// Longest time one call of [`Simulation::step`] may advance, s.
+const LONGEST_TICK_S: f64 = 10.0;
+/// Largest speed a simulation may start with or be asked for, m/s.
+const LARGEST_SPEED_M_S: f64 = 150.0;
+
+/// Inputs to the vehicle over one control tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Command {
+    /// Handwheel angle before the steering actuator, positive to the left, rad.
+    pub handwheel_rad: f64,
+    /// Target speed of the speed controller, m/s.
+    pub target_speed_m_s: f64,
+}
+
+impl Command {
+    /// The command in the units of the paper: degrees of handwheel and km/h.
+    #[must_use]
+    pub fn from_deg_kmh(handwheel_deg: f64, target_speed_kmh: f64) -> Self {
+        Self {
+            handwheel_rad: handwheel_deg * DEGREE,
+            target_speed_m_s: target_speed_kmh * KMH,
+        }
+    }
+}
+
+/// Where and how fast a simulation begins.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct InitialPose {
+    /// World x of the sprung mass, m.
+    pub x_m: f64,
+    /// World y of the sprung mass, m.
+    pub y_m: f64,
+    /// Heading, rad.
+    pub yaw_rad: f64,
+    /// Forward speed, m/s.
+    pub speed_m_s: f64,
+}
+
+/// Why a simulation cannot begin or go on.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SimulationError {
+    /// The vehicle's parameters are not allowed.
+    #[error(transparent)]
+    Parameters(#[from] ParameterError),
+    /// The starting pose is not usable.
+    #[error("initial {what} = {value}: must be in {range}")]
+    Initial {
+        /// Field of [`InitialPose`].
+        what: &'static str,
+        /// Value found.
+        value: f64,
+        /// Allowed interval with its unit.
+        range: &'static str,
+    },
+    /// A command is not a usable number; the state is left as it was.
+    #[error(
+        "command {what} = {value} at {time_s:.2} s: must be {range}; the simulation stopped before it"
+    )]
+    Command {
+        /// Field of [`Command`].
+        what: &'static str,
+        /// Value found.
+        value: f64,
+        /// What is allowed.
+        range: &'static str,
+        /// Simulated time, s.
+        time_s: f64,
+    },
+    /// A time step cannot be used.
+    #[error("{what} = {value} s: must be {range}")]
+    TimeStep {
+        /// Which step.
+        what: &'static str,
+        /// Value found, s.
+        value: f64,
+        /// What is allowed.
+        range: &'static str,
+    },
+    /// The state is no longer finite.
+    #[error(
+        "the vehicle's state is not finite after {time_s:.3} s: reduce the substep or check the vehicle's stiffest parameters"
+    )]
+    Diverged {
+        /// Simulated time, s.
+        time_s: f64,
+    },
+}
+
+/// A vehicle on its terrain at an instant. Cloning it copies the state, so that several futures
+/// can be tried from one past.
+#[derive(Debug, Clone)]
+pub struct Simulation {
+    dynamics: Dynamics,
+    terrain: Terrain,
+    substep_s: f64,
+    state: State,
+    /// Ticks are counted in time, added up in whole substeps.
+    substeps_done: u64,
+    /// Continuous yaw, rad.
+    yaw_rad: f64,
+}
+
+impl Simulation {
+    /// Puts a vehicle on a terrain, rolling straight ahead in equilibrium at its speed.
+    ///
+    /// The equilibrium is found on level ground of friction 1 and then laid onto the ground under
+    /// the vehicle, so on rough or banked ground the first moments still hold a small transient.
+    ///
+    /// # Errors
+    /// [`SimulationError`] when parameters or pose are out of range.
+    pub fn new(
+        vehicle: &VehicleParameters,
+        terrain: Terrain,
+        initial: InitialPose,
+    ) -> Result<Self, SimulationError> {
+        Self::with_substep(vehicle, terrain, initial, DEFAULT_SUBSTEP_S)
+    }
+
+    /// As [`Simulation::new`] with another integration step, such as for a convergence study.
+    ///
+    /// # Errors
+    /// As [`Simulation::new`], and when `substep_s` is not in (0, 5e-3] s.
+    pub fn with_substep(
+        vehicle: &VehicleParameters,
+        terrain: Terrain,
+        initial: InitialPose,
+        substep_s: f64,
+    ) -> Result<Self, SimulationError> {
+        vehicle.check()?;
+        if !(substep_s > 0.0 && substep_s <= 5e-3) {
+            return Err(SimulationError::TimeStep {
+                what: "substep",
+                value: substep_s,
+                range: "in (0, 5e-3]",
+            });
+        }
+        settle::check_pose(&initial)?;
+        let dynamics = Dynamics::new(vehicle);
+        let state = settle::rolling_state(&dynamics, initial.speed_m_s, substep_s);
+        let mut simulation = Self {
+            dynamics,
+            terrain,
+            substep_s,
+            state,
+            substeps_done: 0,
+            yaw_rad: initial.yaw_rad,
+        };
+        simulation.state = settle::placed(&state, &simulation.terrain, &initial);
+        if !simulation.state.is_finite() {
+            return Err(SimulationError::Diverged { time_s: 0.0 });
+        }
+        Ok(simulation)
+    }
+
+    /// Advances by `tick_s` (10 ms in the paper) with the command held, and observes.
+    ///
+    /// # Errors
+    /// [`SimulationError::Command`] for a command that is not finite (the state is unchanged),
+    /// [`SimulationError::TimeStep`] when `tick_s` is no whole number of substeps, and
+    /// [`SimulationError::Diverged`] when the state is no longer finite.
+    pub fn step(&mut self, command: Command, tick_s: f64) -> Result<Observation, SimulationError> {
+        let input = self.checked(command)?;
+        let substeps = self.substeps_in(tick_s)?;
+        for _ in 0..substeps {
+            self.state = rk4(
+                &self.dynamics,
+                &self.state,
+                &input,
+                &self.terrain,
+                self.substep_s,
+            );
+        }
+        self.substeps_done += substeps;
+        if !self.state.is_finite() {
+            return Err(SimulationError::Diverged {
+                time_s: self.time_s(),
+            });
+        }
+        let rotation = self.state.rotation();
+        let yaw = rotation[(1, 0)].atan2(rotation[(0, 0)]);
+        self.yaw_rad += wrap_angle(yaw - self.yaw_rad);
+        Ok(self.observation())
+    }
+
+    /// Simulated time, s.
+    #[must_use]
+    pub fn time_s(&self) -> f64 {
+        self.substeps_done as f64 * self.substep_s
+    }
+
+    /// The full state, for checks and for saving.
+    #[must_use]
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// Goes on from another state of the same vehicle, such as a saved or disturbed one.
+    ///
+    /// # Errors
+    /// [`SimulationError::Diverged`] when the state is not finite.
+    pub fn set_state(&mut self, state: State) -> Result<(), SimulationError> {
+        let length = state.orientation.norm();
+        if !state.is_finite() || length < 0.5 {
+            return Err(SimulationError::Diverged {
+                time_s: self.time_s(),
+            });
+        }
+        self.state = State {
+            orientation: state.orientation / length,
+            ..state
+        };
+        let rotation = self.state.rotation();
+        self.yaw_rad = rotation[(1, 0)].atan2(rotation[(0, 0)]);
+        Ok(())
+    }
+
+    /// Tilts gravity, as a tilt table does, in world axes; (0, 0, −9.81) m/s² at the start.
+    ///
+    /// # Errors
+    /// [`SimulationError::Initial`] when a component is not finite.
+    pub fn set_gravity_m_s2(&mut self, gravity: Vector3<f64>) -> Result<(), SimulationError> {
+        if let Some(value) = gravity.iter().find(|value| !value.is_finite()) {
+            return Err(SimulationError::Initial {
+                what: "gravity",
+                value: *value,
+                range: "(-inf, inf) m/s²",
+            });
+        }
+        self.dynamics.gravity_m_s2 = gravity;
+        Ok(())
+    }
+
+    fn checked(&self, command: Command) -> Result<HeldInput, SimulationError> {
+        let refuse = |what, value, range| {
+            Err(SimulationError::Command {
+                what,
+                value,
+                range,
+                time_s: self.time_s(),
+            })
+        };
+        if !command.handwheel_rad.is_finite() {
+            return refuse("handwheel_rad", command.handwheel_rad, "a finite number");
+        }
+        if !(0.0..=LARGEST_SPEED_M_S).contains(&command.target_speed_m_s) {
+            return refuse(
+                "target_speed_m_s",
+                command.target_speed_m_s,
+                "in [0, 150] m/s",
+            );
+        }
+        Ok(HeldInput {
+            handwheel_rad: self.dynamics.steering.limited_rad(command.handwheel_rad),
+            target_speed_m_s: command.target_speed_m_s,
+        })
+    }
+
+    fn substeps_in(&self, tick_s: f64) -> Result<u64, SimulationError> {
+        const WHOLE: f64 = 1e-6;
+        let ratio = tick_s / self.substep_s;
+        let whole = ratio.round();
+        if !(tick_s > 0.0 && tick_s <= LONGEST_TICK_S) || (ratio - whole).abs() > WHOLE {
+            return Err(SimulationError::TimeStep {
+                what: "tick",
+                value: tick_s,
+                range: "a whole number of substeps in (0, 10]",
+            });
+        }
+        // In (0, 10 s / substep], so it fits and is not negative.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        Ok(whole as u64)
+    }
+}
+
+/// One classical Runge–Kutta step of fourth order.
+fn rk4(
+    dynamics: &Dynamics,
+    state: &State,
+    input: &HeldInput,
+    terrain: &Terrain,
+    step: f64,
+) -> State {
+    let (k1, _) = dynamics.rates(state, input, terrain);
+    let (k2, _) = dynamics.rates(&state.advanced(&k1, 0.5 * step), input, terrain);
+    let (k3, _) = dynamics.rates(&state.advanced(&k2, 0.5 * step), input, terrain);
+    let (k4, _) = dynamics.rates(&state.advanced(&k3, step), input, terrain);
+    let mut next = state
+        .advanced(&k1, step / 6.0)
+        .advanced(&k2, step / 3.0)
+        .advanced(&k3, step / 3.0)
+        .advanced(&k4, step / 6.0);
+    next.orientation /= next.orientation.norm();
+    next
+}

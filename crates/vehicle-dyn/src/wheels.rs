@@ -1,0 +1,170 @@
+//! One wheel on its local ground plane: contact point, load, slip and spin.
+//!
+//! The wheel is a thin disc of radius `R0` about its centre. The contact point lies in the disc
+//! plane, straight down to the ground plane, so leaning wheels stand on their lower edge.
+
+use nalgebra::Vector3;
+
+use crate::terrain::Ground;
+use crate::tyre::{MagicFormula, RadialSpring};
+
+/// Cosine of the largest camber at which a disc still stands on its edge.
+const LEAST_COS_CAMBER: f64 = 0.1;
+/// 1/largest relaxed slip: sliding straight sideways counts as a slip of 10, not as an infinite one.
+const SLIP_PER_LARGEST: f64 = 0.1;
+/// 1/speed of the tread over which rolling resistance fades to zero at standstill, s/m.
+const ROLLING_FADE_S_PER_M: f64 = 10.0;
+
+/// Constants of one wheel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Wheel {
+    /// Tyre force law.
+    pub formula: MagicFormula,
+    /// Radial spring and damper of the tyre.
+    pub radial: RadialSpring,
+    /// Unloaded radius, m.
+    pub radius_m: f64,
+    /// Side slip per rad of camber (no unit).
+    pub camber_thrust_ratio: f64,
+    /// 1/relaxation length, `[longitudinal, lateral]`, 1/m.
+    pub inverse_relaxation: [f64; 2],
+    /// Rolling resistance coefficient (no unit).
+    pub rolling_resistance: f64,
+    /// 1/inertia against spinning up, 1/(kg m²).
+    pub inverse_spin_inertia: f64,
+    /// Inertia of the bare wheel, kg m².
+    pub gyroscopic_inertia: f64,
+}
+
+/// Motion of one wheel in body axes; the origin of positions is the sprung CG.
+#[derive(Debug, Clone, Copy)]
+pub struct WheelMotion {
+    /// Unit spin axis, pointing left.
+    pub axis: Vector3<f64>,
+    /// Velocity of the wheel centre, m/s.
+    pub velocity_m_s: Vector3<f64>,
+    /// Angular rate of the body, rad/s.
+    pub angular_rad_s: Vector3<f64>,
+    /// Rate of the wheel travel, bump positive, m/s.
+    pub travel_rate_m_s: f64,
+    /// Turning of the wheel carrier against the body per travel, rad/m.
+    pub lean_per_travel: Vector3<f64>,
+    /// Sideways motion of the contact point against the body per travel, positive to the left (no
+    /// unit). The links move the contact about the roll centre, so this is their jacking slope.
+    pub scrub_per_travel: f64,
+    /// Height of the wheel centre above the ground plane along its normal, m.
+    pub height_m: f64,
+    /// Unit normal of the ground plane.
+    pub normal: Vector3<f64>,
+    /// Wheel spin about its axis, rad/s.
+    pub spin_rad_s: f64,
+    /// Relaxed slip `[s_x, s_y]` (no unit).
+    pub slip: [f64; 2],
+}
+
+/// What the ground does to one wheel.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Contact {
+    /// Load along the ground normal, N.
+    pub load_n: f64,
+    /// Radial compression of the tyre, m; negative is the gap under a lifted wheel.
+    pub deflection_m: f64,
+    /// Force on the wheel in body axes, N.
+    pub force_n: Vector3<f64>,
+    /// The part of [`Contact::force_n`] in the ground plane, N.
+    pub tangential_n: Vector3<f64>,
+    /// From wheel centre to contact point, m.
+    pub arm_m: Vector3<f64>,
+    /// Rate of the relaxed slip, 1/s.
+    pub slip_rate: [f64; 2],
+    /// Moment of the ground about the spin axis, N m.
+    pub spin_moment_nm: f64,
+    /// What the load does to the wheel travel by leaning the wheel (virtual work), N.
+    pub lean_force_n: f64,
+}
+
+impl Wheel {
+    /// Forces of the ground on a wheel that moves as `motion` over `ground`.
+    #[must_use]
+    #[inline]
+    pub fn contact(&self, motion: &WheelMotion, ground: &Ground) -> Contact {
+        let normal = motion.normal;
+        let forward = motion.axis.cross(&normal);
+        let inverse_cos = 1.0 / forward.norm().max(LEAST_COS_CAMBER);
+        let sin_camber = motion.axis.dot(&normal);
+        let forward = forward * inverse_cos;
+        let left = normal.cross(&forward);
+
+        let distance = motion.height_m * inverse_cos;
+        let arm = (motion.axis * sin_camber - normal) * (inverse_cos * distance);
+        let deflection = self.radius_m - distance;
+        let contact_velocity = motion.velocity_m_s + motion.angular_rad_s.cross(&arm);
+        // Rise of the contact point along the normal per travel, because the wheel leans with it.
+        let rise_per_travel = arm.cross(&normal).dot(&motion.lean_per_travel);
+        let closing_speed =
+            -contact_velocity.dot(&normal) - rise_per_travel * motion.travel_rate_m_s;
+        let load = self.radial.load_n(deflection, closing_speed, inverse_cos);
+
+        // The wheel turns under its carrier, so the carrier's pitch does not move the tread: the
+        // longitudinal slip speed is that of the wheel centre, the lateral one of the contact.
+        let rolling_radius = self.rolling_radius_m(deflection);
+        let tread_speed = motion.spin_rad_s * rolling_radius;
+        let speed = motion.velocity_m_s.dot(&forward);
+        let scrub = motion.scrub_per_travel * motion.travel_rate_m_s;
+        let lateral_speed = contact_velocity.dot(&left) + scrub * left.y;
+        let slip_speed = [tread_speed - speed, -lateral_speed];
+        let slide = (slip_speed[0] * slip_speed[0] + slip_speed[1] * slip_speed[1]).sqrt();
+        let transport = speed.abs().max(slide * SLIP_PER_LARGEST);
+        let slip_rate = [
+            (slip_speed[0] - transport * motion.slip[0]) * self.inverse_relaxation[0],
+            (slip_speed[1] - transport * motion.slip[1]) * self.inverse_relaxation[1],
+        ];
+
+        let slip = [
+            motion.slip[0],
+            motion.slip[1] - self.camber_thrust_ratio * sin_camber,
+        ];
+        let [longitudinal, lateral] = self.formula.force_n(load, ground.friction, slip);
+        let tangential = forward * longitudinal + left * lateral;
+        let rolling = self.rolling_resistance
+            * load
+            * rolling_radius
+            * (tread_speed * ROLLING_FADE_S_PER_M).clamp(-1.0, 1.0);
+        Contact {
+            load_n: load,
+            deflection_m: deflection,
+            force_n: tangential + normal * load,
+            tangential_n: tangential,
+            arm_m: arm,
+            slip_rate,
+            spin_moment_nm: -longitudinal * rolling_radius - rolling,
+            lean_force_n: load * rise_per_travel,
+        }
+    }
+
+    /// Effective rolling radius, m: a radial tyre's tread keeps most of its length when pressed in,
+    /// so it is `R0 − ρ/3` rather than the loaded radius.
+    #[must_use]
+    #[inline]
+    pub fn rolling_radius_m(&self, deflection_m: f64) -> f64 {
+        self.radius_m - deflection_m.max(0.0) * (1.0 / 3.0)
+    }
+}
+
+/// Spin axis in body axes of a wheel steered by an angle, given as `[sin, cos]`, and leaning about
+/// its own forward axis by an angle of tangent `lean`; then the derivatives of the axis by the
+/// steering angle and by `lean`.
+#[must_use]
+#[inline]
+pub fn spin_axis(steer: [f64; 2], lean: f64) -> [Vector3<f64>; 3] {
+    let [sin, cos] = steer;
+    // The tangent needs no trigonometry: leans are small, and this runs 16000 times a second.
+    let cos_lean = 1.0 / (1.0 + lean * lean).sqrt();
+    let sin_lean = lean * cos_lean;
+    let cos_squared = cos_lean * cos_lean;
+    [
+        Vector3::new(-sin * cos_lean, cos * cos_lean, sin_lean),
+        Vector3::new(-cos * cos_lean, -sin * cos_lean, 0.0),
+        Vector3::new(sin * sin_lean, -cos * sin_lean, cos_lean) * cos_squared,
+    ]
+}
