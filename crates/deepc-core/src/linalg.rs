@@ -1,0 +1,57 @@
+//! Dense kernels on slices. They allocate nothing and run on one thread.
+
+use faer::linalg::matmul::matmul;
+use faer::linalg::triangular_solve::{
+    solve_lower_triangular_in_place, solve_upper_triangular_in_place,
+};
+use faer::{Accum, ColMut, ColRef, Mat, MatRef, Par};
+
+/// `out = a·x`.
+pub(crate) fn multiply(out: &mut [f64], a: MatRef<'_, f64>, x: &[f64]) {
+    let (out, x) = (ColMut::from_slice_mut(out), ColRef::from_slice(x));
+    matmul(out, Accum::Replace, a, x, 1.0, Par::Seq);
+}
+
+/// `out += scale·a·x`.
+pub(crate) fn multiply_add(out: &mut [f64], a: MatRef<'_, f64>, x: &[f64], scale: f64) {
+    let (out, x) = (ColMut::from_slice_mut(out), ColRef::from_slice(x));
+    matmul(out, Accum::Add, a, x, scale, Par::Seq);
+}
+
+/// `x ← lower⁻¹·x`.
+pub(crate) fn solve_lower(lower: MatRef<'_, f64>, x: &mut [f64]) {
+    solve_lower_triangular_in_place(lower, ColMut::from_slice_mut(x).as_mat_mut(), Par::Seq);
+}
+
+/// `x ← upper⁻¹·x`.
+pub(crate) fn solve_upper(upper: MatRef<'_, f64>, x: &mut [f64]) {
+    solve_upper_triangular_in_place(upper, ColMut::from_slice_mut(x).as_mat_mut(), Par::Seq);
+}
+
+/// Inner product.
+pub(crate) fn dot(x: &[f64], y: &[f64]) -> f64 {
+    x.iter().zip(y).map(|(a, b)| a * b).sum()
+}
+
+/// Largest magnitude; NaN if any entry is NaN.
+pub(crate) fn max_abs(x: &[f64]) -> f64 {
+    x.iter().fold(0.0, |max, value| {
+        if max >= value.abs() || f64::is_nan(max) {
+            max
+        } else {
+            value.abs()
+        }
+    })
+}
+
+/// Rᵀ as a lower triangular matrix with clean zeros, for the upper trapezoidal `r` (k×n, k ≥ n).
+pub(crate) fn lower_from_upper(r: MatRef<'_, f64>) -> Mat<f64> {
+    let n = r.ncols();
+    Mat::from_fn(n, n, |i, j| {
+        if j <= i && j < r.nrows() {
+            r[(j, i)]
+        } else {
+            0.0
+        }
+    })
+}

@@ -1,0 +1,108 @@
+//! Stage 4: the `DeePC` problem, with its constant matrices built once.
+//!
+//! With the data matrix H̄ (q columns) and the stacked `w = col(u_ini, y_ini, u, y)`, every step
+//! solves (Coulson, Lygeros, Dörfler 2019; the regularised form of Elokda et al. 2021)
+//!
+//! ```text
+//! min  ‖u − u_r‖²_R + ‖y − y_r‖²_Q + λ_g‖g‖² + λ_u‖σ_u‖² + λ_y‖σ_y‖² + Σ (ρs + ½ws²)
+//! s.t. U_p g = u_ini + σ_u      Y_p g = y_ini + σ_y      U_f g = u      Y_f g = y
+//!      u within its bounds,  y within its bounds (hard, or exceeded by s ≥ 0 at the price above)
+//! ```
+//!
+//! in one of two forms with the same optimum:
+//!
+//! | | variables | rows | cost of a step depends on |
+//! |---|---|---|---|
+//! | [`SparseProgram`] | g, u, y, σ: q + (m+p)N + (m+p)`T_ini` | (m+p)L + bounds | the data length |
+//! | [`CondensedProgram`] | (m+p)N | bounds | N only |
+//!
+//! Both are [`DeepcProgram`]s, so a controller does not know which one it has.
+
+mod bounds;
+mod common;
+mod condensed;
+mod error;
+mod past_factor;
+mod plan;
+mod settings;
+mod sparse;
+
+pub use condensed::CondensedProgram;
+pub use error::{ProgramError, SettingsError};
+pub use plan::{Moment, ObjectiveParts, Plan, PlanOrigin, Recovered};
+pub use settings::{
+    Bounds, DeepcSettings, Normalisation, OutputBounds, Regularisation, Slack, Softness,
+};
+pub use sparse::SparseProgram;
+
+use crate::hankel::Shape;
+use crate::solver::{QpProblem, QpSolution, QpSolver, QpVectors, SolveBudget};
+
+/// A past that hard slack cannot explain is called inconsistent above this relative residual.
+pub const CONSISTENCY_TOLERANCE: f64 = 1e-6;
+
+/// A `DeePC` problem whose matrices are fixed and whose vectors are rewritten every step.
+///
+/// # Contract
+/// 1. [`qp`](Self::qp) never changes; a solver is set up with it once.
+/// 2. [`set_moment`](Self::set_moment) rewrites the vectors; it fails, and leaves them as they
+///    were, only if a shape does not fit.
+/// 3. [`plan_unconstrained`](Self::plan_unconstrained) writes the optimum without bounds to the
+///    plan if that optimum is known and meets every bound, and says so.
+/// 4. [`accept`](Self::accept) writes a solver's answer to the plan; only a usable status makes
+///    a usable plan.
+/// 5. All forms of one problem have the same optimum.
+pub trait DeepcProgram: Send {
+    /// Sizes m, p, `T_ini`, N.
+    fn shape(&self) -> Shape;
+
+    /// The settings it was built from.
+    fn settings(&self) -> &DeepcSettings;
+
+    /// Sample time of the data, in seconds.
+    fn sample_time_s(&self) -> f64;
+
+    /// The constant part of the quadratic program.
+    fn qp(&self) -> &QpProblem;
+
+    /// Rewrites the vectors for one moment.
+    ///
+    /// # Errors
+    /// A shape does not fit.
+    fn set_moment(&mut self, moment: &Moment<'_>) -> Result<(), ProgramError>;
+
+    /// The moving part of the quadratic program.
+    fn vectors(&self) -> QpVectors<'_>;
+
+    /// Takes the unconstrained optimum as the plan if it is known and meets every bound.
+    fn plan_unconstrained(&mut self) -> bool;
+
+    /// Takes a solver's answer as the plan.
+    fn accept(&mut self, solution: &QpSolution);
+
+    /// The present plan.
+    fn plan(&self) -> &Plan;
+
+    /// g, the slacks and the parts of the objective of the present plan; `None` if the plan is
+    /// not usable. Allocates and takes a product with the data matrix: for study, not for the
+    /// control loop.
+    fn recover(&self) -> Option<Recovered>;
+
+    /// One step: the unconstrained optimum if it will do, else the solver's.
+    ///
+    /// # Errors
+    /// A shape does not fit the program, or the solver was set up for another one.
+    fn solve(
+        &mut self,
+        moment: &Moment<'_>,
+        solver: &mut dyn QpSolver,
+        budget: &SolveBudget,
+    ) -> Result<&Plan, ProgramError> {
+        self.set_moment(moment)?;
+        if !self.plan_unconstrained() {
+            solver.update(self.vectors())?;
+            self.accept(solver.solve(budget));
+        }
+        Ok(self.plan())
+    }
+}
