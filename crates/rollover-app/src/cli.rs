@@ -1,0 +1,97 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+
+/// Keeps a vehicle from rolling over by data-enabled predictive control.
+#[derive(Debug, Parser)]
+#[command(name = "rollover-app", version, about, max_term_width = 100)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// The main job: the paper's sedan scenario with each controller, a table and a page of figures.
+    Paper(PaperArgs),
+    /// One scenario with one controller: log, summary and figures.
+    Run(RunArgs),
+    /// Records the data a controller works from, by the paper's recipe.
+    Record(RecordArgs),
+}
+
+/// Arguments of `paper`.
+#[derive(Debug, Args)]
+pub struct PaperArgs {
+    /// Seed of the recording the controllers share.
+    #[arg(long, default_value_t = 10)]
+    pub seed: u64,
+    /// Folder for the results.
+    #[arg(long, default_value = "out/paper", value_name = "DIR")]
+    pub out: PathBuf,
+    /// Runs at once; by default one per core.
+    #[arg(long, value_name = "N")]
+    pub jobs: Option<std::num::NonZeroUsize>,
+    /// Print the summaries as JSON on standard output instead of the table.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `run`.
+#[derive(Debug, Args)]
+pub struct RunArgs {
+    /// Name of a scenario, or path of a scenario file.
+    pub scenario: String,
+    /// Name of one of the scenario's controllers.
+    #[arg(long, default_value = crate::scenario::DRIVER, value_name = "NAME")]
+    pub controller: String,
+    /// Seed of the recording the controller works from.
+    #[arg(long, default_value_t = 10)]
+    pub seed: u64,
+    /// Folder for the results; by default `out/SCENARIO/CONTROLLER`.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Vehicle file or name, instead of the scenario's.
+    #[arg(long, value_name = "VEHICLE")]
+    pub vehicle: Option<String>,
+    /// Recording to work from, instead of making one from the seed.
+    #[arg(long, value_name = "FILE")]
+    pub recording: Option<PathBuf>,
+    /// Speed at the start and reference afterwards, instead of the scenario's.
+    #[arg(long, value_name = "KMH", value_parser = speed_kmh)]
+    pub speed: Option<f64>,
+    /// Print the summary as JSON on standard output.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `record`.
+#[derive(Debug, Args)]
+pub struct RecordArgs {
+    /// Name of a scenario, or path of a scenario file.
+    pub scenario: String,
+    /// Seed of the noise on the inputs.
+    #[arg(long, default_value_t = 10)]
+    pub seed: u64,
+    /// Folder for `recording.csv`; by default `out/SCENARIO`.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Vehicle file or name, instead of the scenario's.
+    #[arg(long, value_name = "VEHICLE")]
+    pub vehicle: Option<String>,
+    /// Print the recording's summary as JSON on standard output.
+    #[arg(long)]
+    pub json: bool,
+}
+
+fn speed_kmh(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(speed) if (10.0..=250.0).contains(&speed) => Ok(speed),
+        Ok(speed) => Err(format!("{speed} km/h is not in [10, 250]")),
+        Err(_) => Err("not a number of km/h".into()),
+    }
+}

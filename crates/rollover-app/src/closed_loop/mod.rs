@@ -1,0 +1,190 @@
+//! One run: the vehicle, its driver and a controller between them.
+
+mod build;
+mod plant;
+
+use std::path::Path;
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use deepc_core::controller::{Controller, Origin, Plant, Reference};
+use vehicle_dyn::metrics::Outcome;
+use vehicle_dyn::parameters::VehicleParameters;
+
+pub use build::controller;
+pub use plant::{DrivenVehicle, INPUTS, OUTPUTS};
+
+use crate::interrupt::{Interrupt, Interrupted};
+use crate::run_log::{LogRow, LogWriter, SolveStatus};
+use crate::scenario::Scenario;
+
+/// What to run. The recording and the controller's settings are in `controller` already.
+pub struct Run<'a> {
+    /// The scenario.
+    pub scenario: &'a Scenario,
+    /// Its vehicle.
+    pub vehicle: &'a VehicleParameters,
+    /// Speed at the start and reference afterwards, km/h.
+    pub speed_reference_kmh: f64,
+    /// The controller; `None` leaves the driver alone.
+    pub controller: Option<Box<dyn Controller>>,
+}
+
+/// A finished run.
+pub struct Finished {
+    /// How it ended.
+    pub outcome: Outcome,
+    /// Its log, as written.
+    pub rows: Vec<LogRow>,
+}
+
+/// Runs to the end of the scenario, or to the rollover, writing every step to `log`.
+///
+/// # Errors
+/// When the simulation or the disk fails, or as [`Interrupted`] when the user stops it; the log
+/// then holds every step taken.
+pub fn run(
+    mut run: Run<'_>,
+    log: &Path,
+    interrupt: &Interrupt,
+    mut progress: impl FnMut(),
+) -> Result<Finished> {
+    let mut plant = DrivenVehicle::new(
+        run.scenario,
+        run.vehicle,
+        &run.scenario.course,
+        run.speed_reference_kmh,
+    )?;
+    let mut writer = LogWriter::create(log)?;
+    let mut rows = Vec::with_capacity(run.scenario.steps());
+    let mut reference = run.controller.as_ref().map(|c| c.new_reference());
+    while rows.len() < run.scenario.steps() && !plant.ended() {
+        if interrupt.is_raised() {
+            writer.finish()?;
+            return Err(interrupted(rows.len(), run.scenario, log).into());
+        }
+        let wanted = [plant.driver_steering_deg(), run.speed_reference_kmh];
+        let decision = match (run.controller.as_deref_mut(), reference.as_mut()) {
+            (Some(controller), Some(reference)) => decide(controller, reference, &wanted)?,
+            _ => Decision::passthrough(wanted),
+        };
+        let mut output = [0.0];
+        if let Err(error) = plant.step(&decision.input, &mut output) {
+            writer.finish()?;
+            return Err(error).with_context(|| {
+                format!(
+                    "the simulation failed; {} holds the {} steps before",
+                    log.display(),
+                    rows.len()
+                )
+            });
+        }
+        if let Some(controller) = run.controller.as_deref_mut() {
+            controller.observe(&decision.input, &output);
+        }
+        let row = log_row(rows.len() + 1, &plant, &wanted, &decision, output[0]);
+        writer.append(&row)?;
+        rows.push(row);
+        progress();
+    }
+    writer.finish()?;
+    Ok(Finished {
+        outcome: plant.outcome(),
+        rows,
+    })
+}
+
+fn interrupted(steps: usize, scenario: &Scenario, log: &Path) -> Interrupted {
+    Interrupted {
+        after: format!(
+            "after {:.2} s of {} s",
+            steps as f64 * scenario.sample_time_s,
+            scenario.duration_s
+        ),
+        kept: format!("{} holds the {steps} steps taken", log.display()),
+    }
+}
+
+/// The controller's part of a log row.
+struct Decision {
+    input: [f64; INPUTS],
+    status: SolveStatus,
+    predicted_violation: f64,
+    iterations: u32,
+    time_us: f64,
+}
+
+impl Decision {
+    fn passthrough(input: [f64; INPUTS]) -> Self {
+        Self {
+            input,
+            status: SolveStatus::Passthrough,
+            predicted_violation: 0.0,
+            iterations: 0,
+            time_us: 0.0,
+        }
+    }
+}
+
+/// Asks the controller. The driver's present wish is held over the horizon: that is all that is
+/// known of it.
+fn decide(
+    controller: &mut dyn Controller,
+    reference: &mut Reference,
+    wanted: &[f64; INPUTS],
+) -> Result<Decision> {
+    let started = Instant::now();
+    reference.hold(wanted, &[0.0; OUTPUTS])?;
+    let step = controller.decide(reference);
+    let time_us = started.elapsed().as_secs_f64() * 1e6;
+    let status = match step.origin {
+        Origin::Passthrough => SolveStatus::Passthrough,
+        Origin::Unconstrained => SolveStatus::Unconstrained,
+        Origin::Solver => SolveStatus::Solved,
+        Origin::Plan => SolveStatus::Plan,
+        Origin::Fallback => SolveStatus::FallbackPlan,
+        Origin::Hold => SolveStatus::FallbackHold,
+    };
+    Ok(Decision {
+        input: [step.input[0], step.input[1]],
+        status,
+        predicted_violation: step.predicted_violation,
+        iterations: step.iterations,
+        time_us,
+    })
+}
+
+fn log_row(
+    step: usize,
+    plant: &DrivenVehicle,
+    wanted: &[f64; INPUTS],
+    decision: &Decision,
+    ltr: f64,
+) -> LogRow {
+    let seen = plant.observation();
+    let [front_left, front_right, rear_left, rear_right] = seen.wheel_loads_n;
+    LogRow {
+        // A multiple of the sample time that prints as one would write it.
+        time_s: (step as f64 * plant.sample_time_s() * 1e9).round() / 1e9,
+        steering_wheel_deg: decision.input[0],
+        target_speed_kmh: decision.input[1],
+        steering_wheel_reference_deg: wanted[0],
+        target_speed_reference_kmh: wanted[1],
+        ltr,
+        load_front_left_n: front_left,
+        load_front_right_n: front_right,
+        load_rear_left_n: rear_left,
+        load_rear_right_n: rear_right,
+        roll_deg: seen.roll_rad.to_degrees(),
+        speed_kmh: seen.speed_m_s * 3.6,
+        path_deviation_m: plant.location().lateral_offset_m,
+        x_m: seen.x_m,
+        y_m: seen.y_m,
+        yaw_deg: seen.yaw_rad.to_degrees(),
+        sideslip_deg: seen.sideslip_rad.to_degrees(),
+        solve_status: decision.status,
+        predicted_violation: decision.predicted_violation,
+        iterations: decision.iterations,
+        step_time_us: decision.time_us,
+    }
+}

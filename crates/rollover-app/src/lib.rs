@@ -1,0 +1,36 @@
+//! Rollover prevention by data-enabled predictive control: the one place where the vehicle
+//! (`vehicle-dyn`) and the controller (`deepc-core`) meet.
+//!
+//! ```text
+//! scenario file ─→ record ─→ recording.csv ─→ closed_loop ─→ log.csv ─→ summary, report
+//! ```
+//!
+//! [`scenario`] says what is driven; [`record`] makes the data a controller works from;
+//! [`closed_loop`] runs one controller on one scenario and writes a [`run_log`]; [`campaign`]
+//! arranges runs; [`summary`] and [`report`] read logs only.
+
+pub mod campaign;
+pub mod cli;
+pub mod closed_loop;
+pub mod interrupt;
+pub mod record;
+pub mod report;
+pub mod run_log;
+pub mod scenario;
+pub mod summary;
+
+use anyhow::Result;
+use interrupt::Interrupt;
+
+/// Carries out a command.
+///
+/// # Errors
+/// When it cannot be carried out; the message says what to do. A run that ends in a rollover is
+/// not an error.
+pub fn execute(command: &cli::Command, interrupt: &Interrupt) -> Result<()> {
+    match command {
+        cli::Command::Paper(args) => campaign::paper(args, interrupt),
+        cli::Command::Run(args) => campaign::single(args, interrupt),
+        cli::Command::Record(args) => campaign::record_only(args),
+    }
+}

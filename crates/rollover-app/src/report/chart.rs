@@ -1,0 +1,137 @@
+//! Charts as SVG text.
+
+use anyhow::{Result, anyhow};
+use plotters::coord::Shift;
+use plotters::coord::types::RangedCoordf64;
+use plotters::prelude::*;
+
+/// One line of a chart.
+pub(super) struct Series<'a> {
+    /// Name in the legend; an empty one keeps the line out of the legend.
+    pub(super) name: &'a str,
+    pub(super) style: ShapeStyle,
+    pub(super) points: Vec<(f64, f64)>,
+    /// Whether a cross marks the last point: the run ended early.
+    pub(super) cross: bool,
+}
+
+/// What the axes show.
+pub(super) struct Axes<'a> {
+    pub(super) title: &'a str,
+    pub(super) x_label: &'a str,
+    pub(super) y_label: &'a str,
+    pub(super) x: (f64, f64),
+    pub(super) y: (f64, f64),
+}
+
+/// Colour-blind safe hues (Okabe and Ito), dark enough on white.
+const PALETTE: [RGBColor; 6] = [
+    RGBColor(213, 94, 0),
+    RGBColor(0, 114, 178),
+    RGBColor(0, 158, 115),
+    RGBColor(170, 68, 153),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+];
+const INK: RGBColor = RGBColor(45, 49, 54);
+const GRID: RGBColor = RGBColor(226, 229, 233);
+/// Half the size of the mark where a run ended early, in pixels.
+const CROSS_SIZE: i32 = 6;
+const FONT: &str = "Helvetica, Arial, sans-serif";
+
+/// Colour of the `index`-th run of a figure.
+pub(super) fn run_colour(index: usize) -> RGBColor {
+    PALETTE[index % PALETTE.len()]
+}
+
+/// Thin grey line for limits and edges.
+pub(super) fn limit_style() -> ShapeStyle {
+    RGBColor(120, 125, 131).stroke_width(1)
+}
+
+/// A tick's number without the zeros that say nothing.
+fn tick(value: f64) -> String {
+    // Ticks are multiples of a round step; what is left beyond is rounding.
+    let rounded = (value * 1e6).round() / 1e6;
+    // Adding zero turns −0 into 0.
+    (rounded + 0.0).to_string()
+}
+
+/// Width of the `index`-th run's line. Earlier runs lie below and are wider, so that runs which
+/// coincide are all seen.
+pub(super) fn run_width(index: usize) -> u32 {
+    [5, 3, 2, 2].get(index).copied().unwrap_or(1)
+}
+
+/// Draws series over common axes and returns the SVG.
+pub(super) fn line_chart(
+    size: (u32, u32),
+    axes: &Axes<'_>,
+    series: &[Series<'_>],
+) -> Result<String> {
+    let mut svg = String::new();
+    {
+        let area = SVGBackend::with_string(&mut svg, size).into_drawing_area();
+        draw(&area, axes, series).map_err(|e| anyhow!("cannot draw `{}`: {e}", axes.title))?;
+    }
+    Ok(svg)
+}
+
+type Backend<'a> = SVGBackend<'a>;
+type DrawResult = Result<(), DrawingAreaErrorKind<<Backend<'static> as DrawingBackend>::ErrorType>>;
+
+fn draw(
+    area: &DrawingArea<Backend<'_>, Shift>,
+    axes: &Axes<'_>,
+    series: &[Series<'_>],
+) -> DrawResult {
+    area.fill(&WHITE)?;
+    let mut chart = ChartBuilder::on(area)
+        .margin(14)
+        .caption(axes.title, (FONT, 18).into_font().color(&INK))
+        .x_label_area_size(44)
+        .y_label_area_size(64)
+        .build_cartesian_2d(axes.x.0..axes.x.1, axes.y.0..axes.y.1)?;
+    chart
+        .configure_mesh()
+        .x_label_formatter(&|value| tick(*value))
+        .y_label_formatter(&|value| tick(*value))
+        .x_desc(axes.x_label)
+        .y_desc(axes.y_label)
+        .label_style((FONT, 13).into_font().color(&INK))
+        .axis_desc_style((FONT, 14).into_font().color(&INK))
+        .axis_style(INK.stroke_width(1))
+        .bold_line_style(GRID)
+        .light_line_style(TRANSPARENT)
+        .draw()?;
+    for line in series {
+        draw_series(&mut chart, line)?;
+    }
+    if series.iter().any(|s| !s.name.is_empty()) {
+        chart
+            .configure_series_labels()
+            .position(SeriesLabelPosition::UpperLeft)
+            .label_font((FONT, 13).into_font().color(&INK))
+            .background_style(WHITE.mix(0.85))
+            .border_style(GRID)
+            .draw()?;
+    }
+    area.present()
+}
+
+type Chart<'a, 'b> = ChartContext<'a, Backend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+
+fn draw_series(chart: &mut Chart<'_, '_>, line: &Series<'_>) -> DrawResult {
+    let style = line.style;
+    let drawn = chart.draw_series(LineSeries::new(line.points.iter().copied(), style))?;
+    if !line.name.is_empty() {
+        drawn
+            .label(line.name)
+            .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style.stroke_width(3)));
+    }
+    if let Some(&end) = line.points.last().filter(|_| line.cross) {
+        let mark = Cross::new(end, CROSS_SIZE, line.style.color.stroke_width(3));
+        chart.draw_series(std::iter::once(mark))?;
+    }
+    Ok(())
+}

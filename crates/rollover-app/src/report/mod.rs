@@ -1,0 +1,10 @@
+//! Figures and pages drawn from run logs. Nothing here simulates or controls.
+
+mod chart;
+mod figures;
+mod page;
+mod table;
+
+pub use figures::{Figure, Polyline, RunTrace, draw_all};
+pub use page::{Page, PageRun, write_index};
+pub use table::summary_table;

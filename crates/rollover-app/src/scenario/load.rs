@@ -1,0 +1,292 @@
+//! Finding, reading and checking scenario files.
+
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+use vehicle_dyn::road::Course;
+
+use super::{ControllerSettings, Scenario};
+
+/// Scenarios that travel with the binary.
+const EMBEDDED: [(&str, &str); 1] = [(
+    "sedan-s1",
+    include_str!("../../../../scenarios/sedan-s1.toml"),
+)];
+
+/// What can be wrong with a scenario.
+#[derive(Debug, Error)]
+pub enum ScenarioError {
+    /// Neither a file nor an embedded name.
+    #[error(
+        "there is no scenario `{name}`{suggestion}; give the path of a scenario file or one of: {known}"
+    )]
+    Unknown {
+        /// What was asked for.
+        name: String,
+        /// " (did you mean `x`?)" or nothing.
+        suggestion: String,
+        /// Names of the embedded scenarios.
+        known: String,
+    },
+    /// The file cannot be read.
+    #[error("cannot read the scenario file {path}")]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The file is not a scenario.
+    #[error("{origin} is not a scenario")]
+    Malformed {
+        /// The file or the embedded name.
+        origin: String,
+        /// Where and what, from the parser.
+        source: Box<toml::de::Error>,
+    },
+    /// A value is out of its range.
+    #[error("{origin}: `{field}` = {value}: must be {allowed}")]
+    OutOfRange {
+        /// The file or the embedded name.
+        origin: String,
+        /// The field.
+        field: String,
+        /// What it holds.
+        value: String,
+        /// What it may hold.
+        allowed: String,
+    },
+    /// A course cannot be built or does not fit.
+    #[error("{origin}: {field}: {message}")]
+    Course {
+        /// The file or the embedded name.
+        origin: String,
+        /// The course's field.
+        field: &'static str,
+        /// What is wrong and what to do.
+        message: String,
+    },
+    /// The scenario has no such controller.
+    #[error("scenario {scenario} has no controller `{controller}`: choose one of {known}")]
+    UnknownController {
+        /// The scenario.
+        scenario: String,
+        /// What was asked for.
+        controller: String,
+        /// The controllers it has.
+        known: String,
+    },
+}
+
+/// Names of the scenarios that travel with the binary.
+#[must_use]
+pub fn embedded_names() -> Vec<&'static str> {
+    EMBEDDED.iter().map(|(name, _)| *name).collect()
+}
+
+/// Loads a scenario: a file when `name_or_path` is one, else an embedded scenario.
+///
+/// # Errors
+/// When there is no such scenario, or it does not hold what it must; see [`ScenarioError`].
+pub fn load(name_or_path: &str) -> Result<Scenario, ScenarioError> {
+    let path = Path::new(name_or_path);
+    if path.is_file() || path.extension().is_some_and(|e| e == "toml") {
+        let text = std::fs::read_to_string(path).map_err(|source| ScenarioError::Unreadable {
+            path: path.to_path_buf(),
+            source,
+        })?;
+        return parse(&text, name_or_path);
+    }
+    let found = EMBEDDED.iter().find(|(name, _)| *name == name_or_path);
+    found.map_or_else(
+        || Err(unknown(name_or_path)),
+        |(name, text)| parse(text, &format!("the built-in scenario {name}")),
+    )
+}
+
+fn unknown(name: &str) -> ScenarioError {
+    let names = embedded_names();
+    let closest = names
+        .iter()
+        .max_by(|a, b| strsim::jaro_winkler(a, name).total_cmp(&strsim::jaro_winkler(b, name)));
+    let suggestion = closest
+        .filter(|c| strsim::jaro_winkler(c, name) > 0.75)
+        .map_or_else(String::new, |c| format!(" (did you mean `{c}`?)"));
+    ScenarioError::Unknown {
+        name: name.to_owned(),
+        suggestion,
+        known: names.join(", "),
+    }
+}
+
+fn parse(text: &str, origin: &str) -> Result<Scenario, ScenarioError> {
+    let scenario: Scenario = toml::from_str(text).map_err(|source| ScenarioError::Malformed {
+        origin: origin.to_owned(),
+        source: Box::new(source),
+    })?;
+    Check { origin }.scenario(&scenario)?;
+    Ok(scenario)
+}
+
+/// Range checks; every message names the origin, the field, the number and what is allowed.
+struct Check<'a> {
+    origin: &'a str,
+}
+
+impl Check<'_> {
+    fn scenario(&self, s: &Scenario) -> Result<(), ScenarioError> {
+        self.within("sample_time_s", s.sample_time_s, 0.001, 0.1)?;
+        self.within("duration_s", s.duration_s, s.sample_time_s, 3600.0)?;
+        self.within("speed_reference_kmh", s.speed_reference_kmh, 10.0, 250.0)?;
+        self.within("ground.friction", s.ground.friction, 0.01, 1.5)?;
+        self.range("bounds.steering_wheel_deg", s.bounds.steering_wheel_deg)?;
+        self.range("bounds.target_speed_kmh", s.bounds.target_speed_kmh)?;
+        let recording = &s.recording;
+        self.within(
+            "recording.duration_s",
+            recording.duration_s,
+            s.sample_time_s,
+            3600.0,
+        )?;
+        self.within(
+            "recording.target_speed_kmh",
+            recording.target_speed_kmh,
+            10.0,
+            250.0,
+        )?;
+        self.within(
+            "recording.steering_wheel_noise_deg",
+            recording.steering_wheel_noise_deg,
+            0.0,
+            90.0,
+        )?;
+        self.within(
+            "recording.target_speed_noise_kmh",
+            recording.target_speed_noise_kmh,
+            0.0,
+            50.0,
+        )?;
+        self.course(
+            "course",
+            Course::new(&s.course),
+            s.duration_s,
+            s.speed_reference_kmh,
+        )?;
+        self.course(
+            "recording.course",
+            Course::new(&recording.course),
+            recording.duration_s,
+            recording.target_speed_kmh,
+        )?;
+        s.driver.check().map_err(|e| ScenarioError::Course {
+            origin: self.origin.to_owned(),
+            field: "driver",
+            message: e.to_string(),
+        })?;
+        s.controllers
+            .iter()
+            .try_for_each(|(name, c)| self.controller(name, c))
+    }
+
+    fn controller(&self, name: &str, c: &ControllerSettings) -> Result<(), ScenarioError> {
+        let field = |key: &str| format!("controllers.{name}.{key}");
+        if name == super::DRIVER {
+            return Err(self.out_of_range(
+                &format!("controllers.{name}"),
+                "a controller".into(),
+                "another name: `driver` is the driver alone in every scenario",
+            ));
+        }
+        self.within(&field("ltr_limit"), c.ltr_limit, 0.05, 2.0)?;
+        let counts = [
+            ("past_steps", c.past_steps),
+            ("horizon_steps", c.horizon_steps),
+            ("order_bound", c.order_bound),
+            ("moves_per_solve", c.moves_per_solve),
+        ];
+        for (key, count) in counts {
+            if count == 0 || count > 10_000 {
+                return Err(self.out_of_range(&field(key), count.to_string(), "in [1, 10000]"));
+            }
+        }
+        if c.moves_per_solve > c.horizon_steps {
+            return Err(self.out_of_range(
+                &field("moves_per_solve"),
+                c.moves_per_solve.to_string(),
+                &format!("at most horizon_steps = {}", c.horizon_steps),
+            ));
+        }
+        let weights = [
+            (
+                "input_weights.steering_wheel_per_deg2",
+                c.input_weights.steering_wheel_per_deg2,
+            ),
+            (
+                "input_weights.target_speed_per_kmh2",
+                c.input_weights.target_speed_per_kmh2,
+            ),
+            ("ltr_penalty.linear", c.ltr_penalty.linear),
+            ("ltr_penalty.quadratic", c.ltr_penalty.quadratic),
+        ];
+        weights
+            .iter()
+            .try_for_each(|&(key, w)| self.within(&field(key), w, 0.0, 1e15))?;
+        let positive = [
+            ("regularisation.lambda_g", c.regularisation.lambda_g),
+            ("lambda_u", c.lambda_u),
+            ("lambda_y", c.lambda_y),
+        ];
+        positive
+            .iter()
+            .try_for_each(|&(key, w)| self.within(&field(key), w, 1e-12, 1e15))
+    }
+
+    fn course<E: std::fmt::Display>(
+        &self,
+        field: &'static str,
+        course: Result<Course, E>,
+        duration_s: f64,
+        speed_kmh: f64,
+    ) -> Result<(), ScenarioError> {
+        let wrong = |message: String| ScenarioError::Course {
+            origin: self.origin.to_owned(),
+            field,
+            message,
+        };
+        let length = course.map_err(|e| wrong(e.to_string()))?.total_length_m();
+        let needed = duration_s * speed_kmh / 3.6;
+        if length < needed {
+            return Err(wrong(format!(
+                "the road is {length:.0} m long, but {duration_s} s at {speed_kmh} km/h take {needed:.0} m: lengthen its last straight"
+            )));
+        }
+        Ok(())
+    }
+
+    fn within(&self, field: &str, value: f64, low: f64, high: f64) -> Result<(), ScenarioError> {
+        if (low..=high).contains(&value) {
+            return Ok(());
+        }
+        Err(self.out_of_range(field, value.to_string(), &format!("in [{low}, {high}]")))
+    }
+
+    fn range(&self, field: &str, [low, high]: [f64; 2]) -> Result<(), ScenarioError> {
+        if low < high && low.is_finite() && high.is_finite() {
+            return Ok(());
+        }
+        Err(self.out_of_range(
+            field,
+            format!("[{low}, {high}]"),
+            "[lowest, highest], both finite",
+        ))
+    }
+
+    fn out_of_range(&self, field: &str, value: String, allowed: &str) -> ScenarioError {
+        ScenarioError::OutOfRange {
+            origin: self.origin.to_owned(),
+            field: field.to_owned(),
+            value,
+            allowed: allowed.to_owned(),
+        }
+    }
+}

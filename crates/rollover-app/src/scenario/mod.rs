@@ -1,0 +1,127 @@
+//! Scenarios as data: what is driven where, by whom, and what the controllers may do.
+
+mod controllers;
+mod load;
+
+use serde::Deserialize;
+use vehicle_dyn::driver::DriverParameters;
+use vehicle_dyn::road::CourseDescription;
+
+pub use controllers::{ControllerSettings, LtrPenalty, Method};
+pub use load::{ScenarioError, embedded_names, load};
+
+/// Name of the controller that every scenario has: the driver alone.
+pub const DRIVER: &str = "driver";
+
+/// A scenario file.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scenario {
+    /// Short name, also the name of its file.
+    pub name: String,
+    /// What it shows, in a sentence or two.
+    pub description: String,
+    /// Name of an embedded vehicle, or path of a vehicle file.
+    pub vehicle: String,
+    /// Length of a run, s.
+    pub duration_s: f64,
+    /// Control sample time, s.
+    pub sample_time_s: f64,
+    /// Speed at the start and reference afterwards, km/h.
+    pub speed_reference_kmh: f64,
+    /// The ground.
+    pub ground: Ground,
+    /// The driver, who steers in every run and is the reference of the controllers.
+    pub driver: DriverParameters,
+    /// The road to be driven.
+    pub course: CourseDescription,
+    /// Bounds on the inputs, for every controller.
+    pub bounds: InputBounds,
+    /// How the controllers' data are recorded.
+    pub recording: RecordingRecipe,
+    /// Controllers by name. [`DRIVER`] is always there and is not listed.
+    pub controllers: std::collections::BTreeMap<String, ControllerSettings>,
+}
+
+/// The ground under the course.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Ground {
+    /// Friction coefficient of the road, dimensionless (the tyre's own factor is in the vehicle file).
+    pub friction: f64,
+}
+
+/// Bounds on the inputs.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InputBounds {
+    /// Lowest and highest steering-wheel angle, deg.
+    pub steering_wheel_deg: [f64; 2],
+    /// Lowest and highest target speed, km/h.
+    pub target_speed_kmh: [f64; 2],
+}
+
+/// The paper's data recipe: the driver follows a winding road, white noise on both inputs.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RecordingRecipe {
+    /// Length of the recording, s.
+    pub duration_s: f64,
+    /// Target speed before noise, km/h.
+    pub target_speed_kmh: f64,
+    /// Standard deviation of the noise on the steering wheel, deg per sample.
+    pub steering_wheel_noise_deg: f64,
+    /// Standard deviation of the noise on the target speed, km/h per sample.
+    pub target_speed_noise_kmh: f64,
+    /// The road of the recording.
+    pub course: CourseDescription,
+}
+
+impl Scenario {
+    /// Names of all controllers, the driver first.
+    #[must_use]
+    pub fn controller_names(&self) -> Vec<&str> {
+        std::iter::once(DRIVER)
+            .chain(self.controllers.keys().map(String::as_str))
+            .collect()
+    }
+
+    /// The settings of a controller, or `None` for the driver alone.
+    ///
+    /// # Errors
+    /// When the scenario has no controller of that name.
+    pub fn controller(&self, name: &str) -> Result<Option<&ControllerSettings>, ScenarioError> {
+        if name == DRIVER {
+            return Ok(None);
+        }
+        self.controllers
+            .get(name)
+            .map(Some)
+            .ok_or_else(|| ScenarioError::UnknownController {
+                scenario: self.name.clone(),
+                controller: name.to_owned(),
+                known: self.controller_names().join(", "),
+            })
+    }
+
+    /// Number of control steps of a run.
+    #[must_use]
+    pub fn steps(&self) -> usize {
+        steps(self.duration_s, self.sample_time_s)
+    }
+
+    /// Number of samples of a recording.
+    #[must_use]
+    pub fn recording_samples(&self) -> usize {
+        steps(self.recording.duration_s, self.sample_time_s)
+    }
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "checked positive and small"
+)]
+fn steps(duration_s: f64, sample_time_s: f64) -> usize {
+    (duration_s / sample_time_s).round() as usize
+}

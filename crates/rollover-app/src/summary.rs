@@ -1,0 +1,154 @@
+//! What a run comes to: the numbers of `summary.json`, computed from its log alone.
+
+use serde::{Deserialize, Serialize};
+use vehicle_dyn::metrics::Outcome;
+
+use crate::run_log::{LogRow, SolveStatus};
+
+/// The summary of one run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Summary {
+    /// Name of the scenario.
+    pub scenario: String,
+    /// Name of the vehicle.
+    pub vehicle: String,
+    /// Name of the controller.
+    pub controller: String,
+    /// Seed of the recording the controller works from.
+    pub seed: u64,
+    /// How the run ended.
+    pub outcome: Outcome,
+    /// Time at which the outcome was decided, s.
+    pub end_time_s: f64,
+    /// Largest |LTR|.
+    pub ltr_abs_max: f64,
+    /// Time spent with |LTR| above the paper's limit of 1, s.
+    pub ltr_violation_s: f64,
+    /// Lowest speed, km/h.
+    pub speed_min_kmh: f64,
+    /// Mean speed, km/h.
+    pub speed_mean_kmh: f64,
+    /// Largest distance from the centre line, m.
+    pub path_deviation_max_m: f64,
+    /// Largest change of the driver's steering-wheel angle, deg.
+    pub steering_correction_max_deg: f64,
+    /// Stage costs of the inputs summed over the run (paper, Table I; deg² and km²/h²).
+    pub cost: f64,
+    /// Control steps taken.
+    pub steps: usize,
+    /// Steps in which the unconstrained optimum was feasible and no solver ran.
+    pub unconstrained_steps: usize,
+    /// Steps in which the QP solver ran to an optimum.
+    pub solver_steps: usize,
+    /// Steps in which the solve failed and the controller fell back.
+    pub fallback_steps: usize,
+    /// Wall-clock time of a step, µs.
+    pub step_time_us: StepTime,
+}
+
+/// Distribution of the wall-clock time of a step, µs.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct StepTime {
+    /// Half of the steps are at most this long.
+    pub median: f64,
+    /// 99 of 100 steps are at most this long.
+    pub p99: f64,
+    /// The longest step.
+    pub max: f64,
+}
+
+/// Who ran what: the part of a summary that the log does not hold.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RunIdentity {
+    /// Name of the scenario.
+    pub scenario: String,
+    /// Name of the vehicle.
+    pub vehicle: String,
+    /// Name of the controller.
+    pub controller: String,
+    /// Seed of the recording.
+    pub seed: u64,
+}
+
+/// Stage-cost weights on the inputs' distance from their references.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InputWeights {
+    /// On the steering wheel, 1/deg².
+    pub steering_wheel_per_deg2: f64,
+    /// On the target speed, 1/(km/h)².
+    pub target_speed_per_kmh2: f64,
+}
+
+impl InputWeights {
+    /// Stage cost `‖u − u_r‖²_R` of one step (Q = 0 in the paper's simulations).
+    #[must_use]
+    pub fn stage_cost(&self, row: &LogRow) -> f64 {
+        let steering = row.steering_wheel_deg - row.steering_wheel_reference_deg;
+        let speed = row.target_speed_kmh - row.target_speed_reference_kmh;
+        self.steering_wheel_per_deg2 * steering * steering
+            + self.target_speed_per_kmh2 * speed * speed
+    }
+}
+
+/// The paper's limit on |LTR|, at which the inner wheels lift off.
+pub const LTR_LIFT_OFF: f64 = 1.0;
+
+impl Summary {
+    /// Computes the summary of a log. Without `weights` (the driver alone tracks himself) the
+    /// cost is 0.
+    #[must_use]
+    pub fn of_log(
+        identity: RunIdentity,
+        outcome: Outcome,
+        rows: &[LogRow],
+        weights: Option<&InputWeights>,
+        sample_time_s: f64,
+    ) -> Self {
+        let max_of = |f: fn(&LogRow) -> f64| rows.iter().map(f).fold(0.0, f64::max);
+        let count = |f: fn(SolveStatus) -> bool| rows.iter().filter(|r| f(r.solve_status)).count();
+        let violating = rows.iter().filter(|r| r.ltr.abs() > LTR_LIFT_OFF).count();
+        Self {
+            scenario: identity.scenario,
+            vehicle: identity.vehicle,
+            controller: identity.controller,
+            seed: identity.seed,
+            outcome,
+            end_time_s: rows.last().map_or(0.0, |r| r.time_s),
+            ltr_abs_max: max_of(|r| r.ltr.abs()),
+            ltr_violation_s: violating as f64 * sample_time_s,
+            speed_min_kmh: rows
+                .iter()
+                .map(|r| r.speed_kmh)
+                .fold(f64::INFINITY, f64::min),
+            speed_mean_kmh: rows.iter().map(|r| r.speed_kmh).sum::<f64>() / rows.len() as f64,
+            path_deviation_max_m: max_of(|r| r.path_deviation_m.abs()),
+            steering_correction_max_deg: max_of(|r| {
+                (r.steering_wheel_deg - r.steering_wheel_reference_deg).abs()
+            }),
+            cost: weights.map_or(0.0, |w| rows.iter().map(|r| w.stage_cost(r)).sum()),
+            steps: rows.len(),
+            unconstrained_steps: count(|s| s == SolveStatus::Unconstrained),
+            solver_steps: count(|s| s == SolveStatus::Solved),
+            fallback_steps: count(SolveStatus::is_fallback),
+            step_time_us: StepTime::of(rows.iter().map(|r| r.step_time_us)),
+        }
+    }
+}
+
+impl StepTime {
+    fn of(times: impl Iterator<Item = f64>) -> Self {
+        let mut sorted: Vec<f64> = times.collect();
+        sorted.sort_by(f64::total_cmp);
+        // Nearest-rank quantile: always a time that was measured.
+        let quantile = |numerator: usize| {
+            let rank = (sorted.len() * numerator).div_ceil(100).max(1);
+            sorted.get(rank - 1).copied().unwrap_or(0.0)
+        };
+        Self {
+            median: quantile(50),
+            p99: quantile(99),
+            max: quantile(100),
+        }
+    }
+}
