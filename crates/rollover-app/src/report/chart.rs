@@ -60,7 +60,7 @@ fn tick(value: f64) -> String {
 /// Width of the `index`-th run's line. Earlier runs lie below and are wider, so that runs which
 /// coincide are all seen.
 pub(super) fn run_width(index: usize) -> u32 {
-    [5, 3, 2, 2].get(index).copied().unwrap_or(1)
+    [4, 3, 2, 2].get(index).copied().unwrap_or(1)
 }
 
 /// Draws series over common axes and returns the SVG.

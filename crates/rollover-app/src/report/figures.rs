@@ -32,6 +32,8 @@ pub struct Figure {
 pub type Polyline = Vec<(f64, f64)>;
 
 const WIDE: (u32, u32) = (920, 400);
+/// LTR beyond its limits, with room for the legend above.
+const LTR_AXIS: (f64, f64) = (-1.5, 2.1);
 
 /// Draws load transfer ratio, speed, steering wheel and the course from above.
 ///
@@ -52,7 +54,7 @@ fn ltr(runs: &[RunTrace<'_>]) -> Result<Figure> {
     Ok(Figure {
         name: "ltr",
         caption: "Load transfer ratio. At ±1 the inner wheels carry nothing. A cross marks a run that ended early.".into(),
-        svg: time_chart(runs, "Load transfer ratio", "LTR", (-1.6, 1.6), &series)?,
+        svg: time_chart(runs, "Load transfer ratio", "LTR", LTR_AXIS, &series)?,
     })
 }
 
