@@ -13,6 +13,7 @@ pub mod campaign;
 pub mod cli;
 pub mod closed_loop;
 pub mod interrupt;
+pub mod output;
 pub mod record;
 pub mod report;
 pub mod run_log;

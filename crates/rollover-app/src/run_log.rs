@@ -183,20 +183,3 @@ pub fn read(path: &Path) -> Result<Vec<LogRow>> {
     }
     Ok(rows)
 }
-
-/// Writes a whole file at once, so that an interruption never leaves half of it.
-///
-/// # Errors
-/// When the folder cannot be written.
-pub fn write_whole(path: &Path, contents: &str) -> Result<()> {
-    let partial = path.with_added_extension("partial");
-    let written = std::fs::write(&partial, contents).and_then(|()| std::fs::rename(&partial, path));
-    written.with_context(|| {
-        // The disk refused the file already; a leftover is all that a failed removal can cost.
-        let _ = std::fs::remove_file(&partial);
-        format!(
-            "cannot write {}: choose another folder with --out",
-            path.display()
-        )
-    })
-}

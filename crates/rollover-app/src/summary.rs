@@ -16,6 +16,10 @@ pub struct Summary {
     pub controller: String,
     /// Seed of the recording the controller works from.
     pub seed: u64,
+    /// File of the recording, where it was given and not made from the seed.
+    pub recording: Option<String>,
+    /// Speed at the start and reference afterwards, km/h.
+    pub speed_reference_kmh: f64,
     /// How the run ended.
     pub outcome: Outcome,
     /// Time at which the outcome was decided, s.
@@ -58,7 +62,7 @@ pub struct StepTime {
 }
 
 /// Who ran what: the part of a summary that the log does not hold.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct RunIdentity {
     /// Name of the scenario.
     pub scenario: String,
@@ -68,6 +72,10 @@ pub struct RunIdentity {
     pub controller: String,
     /// Seed of the recording.
     pub seed: u64,
+    /// File of the recording, where it was given and not made from the seed.
+    pub recording: Option<String>,
+    /// Speed at the start and reference afterwards, km/h.
+    pub speed_reference_kmh: f64,
 }
 
 /// Stage-cost weights on the inputs' distance from their references.
@@ -113,6 +121,8 @@ impl Summary {
             vehicle: identity.vehicle,
             controller: identity.controller,
             seed: identity.seed,
+            recording: identity.recording,
+            speed_reference_kmh: identity.speed_reference_kmh,
             outcome,
             end_time_s: rows.last().map_or(0.0, |r| r.time_s),
             ltr_abs_max: max_of(|r| r.ltr.abs()),

@@ -76,6 +76,8 @@ fn a_summary_counts_what_the_log_holds() {
         vehicle: "vehicle".into(),
         controller: "controller".into(),
         seed: 7,
+        recording: None,
+        speed_reference_kmh: 105.0,
     };
     let weights = InputWeights {
         steering_wheel_per_deg2: 2.0,
@@ -114,6 +116,8 @@ fn summary_json_has_the_fields_programs_rely_on() {
         vehicle: "v".into(),
         controller: "c".into(),
         seed: 1,
+        recording: None,
+        speed_reference_kmh: 105.0,
     };
     let summary = Summary::of_log(identity, Outcome::RolledOver, &rows(3), None, 0.01);
     let json = serde_json::to_value(&summary).expect("a summary is JSON");

@@ -8,7 +8,7 @@ use vehicle_dyn::metrics::Outcome;
 
 use super::Figure;
 use super::table::{HEADINGS, TIME_HEADINGS, cells, time_cells};
-use crate::run_log::write_whole;
+use crate::output::write_whole;
 use crate::summary::Summary;
 
 /// What the page shows.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{folder, read, succeed};
+use super::{command, folder, read, succeed};
 
 /// The log without its last column, the measured time of each step.
 fn log_without_times(path: &Path) -> String {
@@ -87,4 +87,21 @@ fn a_recording_read_back_gives_the_same_run() {
     succeed(folder.path(), &again);
     let log = |out: &str| log_without_times(&folder.path().join(out).join("log.csv"));
     assert_eq!(log("made"), log("read"));
+}
+
+#[test]
+fn a_reader_that_has_seen_enough_is_no_error() {
+    let folder = folder();
+    let mut running = command(folder.path(), &["run", "sedan-s1", "--json"])
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .expect("the command starts");
+    drop(running.stdout.take());
+    let output = running.wait_with_output().expect("the command ends");
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        output.status.success(),
+        "a closed pipe must not fail the run: {errors}"
+    );
 }

@@ -1,0 +1,185 @@
+//! Making runs, several at a time.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use anyhow::{Context, Result, anyhow};
+use deepc_core::data::Dataset;
+use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
+use vehicle_dyn::metrics::Outcome;
+use vehicle_dyn::parameters::VehicleParameters;
+use vehicle_dyn::road::Course;
+
+use crate::closed_loop::{self, Run};
+use crate::interrupt::Interrupt;
+use crate::output::{create_folder, write_json, write_whole};
+use crate::report::{self, Figure, PageRun, Polyline, RunTrace};
+use crate::run_log::LogRow;
+use crate::scenario::Scenario;
+use crate::summary::{RunIdentity, Summary};
+
+/// One run to be made.
+pub(super) struct Job<'a> {
+    pub(super) scenario: &'a Scenario,
+    pub(super) vehicle: &'a VehicleParameters,
+    pub(super) controller: &'a str,
+    pub(super) seed: u64,
+    pub(super) speed_reference_kmh: f64,
+    pub(super) data: Option<&'a Dataset>,
+    pub(super) recording: Option<&'a Path>,
+    pub(super) out: PathBuf,
+}
+
+/// A run that was made.
+pub(super) struct RunResult {
+    pub(super) summary: Summary,
+    rows: Vec<LogRow>,
+    figures: Vec<Figure>,
+}
+
+impl Job<'_> {
+    /// Runs, then writes summary and figures beside the log.
+    pub(super) fn run(&self, interrupt: &Interrupt, bar: &ProgressBar) -> Result<RunResult> {
+        create_folder(&self.out)?;
+        self.remove_old_results()?;
+        let settings = self.scenario.controller(self.controller)?;
+        let controller = match (settings, self.data) {
+            (Some(settings), Some(data)) => {
+                Some(closed_loop::controller(self.scenario, settings, data)?)
+            }
+            _ => None,
+        };
+        let run = Run {
+            scenario: self.scenario,
+            vehicle: self.vehicle,
+            speed_reference_kmh: self.speed_reference_kmh,
+            controller,
+        };
+        let log = self.out.join("log.csv");
+        let finished = closed_loop::run(run, &log, interrupt, || bar.inc(1))?;
+        let summary = Summary::of_log(
+            RunIdentity {
+                scenario: self.scenario.name.clone(),
+                vehicle: self.vehicle.name.clone(),
+                controller: self.controller.to_owned(),
+                seed: self.seed,
+                recording: self.recording.map(|file| file.display().to_string()),
+                speed_reference_kmh: self.speed_reference_kmh,
+            },
+            finished.outcome,
+            &finished.rows,
+            settings.map(|s| &s.input_weights),
+            self.scenario.sample_time_s,
+        );
+        write_json(&self.out.join("summary.json"), &summary)?;
+        let mut result = RunResult {
+            summary,
+            rows: finished.rows,
+            figures: Vec::new(),
+        };
+        result.figures = report::draw_all(&[result.trace()], &road_edges(self.scenario)?)?;
+        write_figures(&self.out, &result.figures)?;
+        Ok(result)
+    }
+
+    /// A summary of an earlier run beside a fresh log would be a lie if this run is interrupted.
+    fn remove_old_results(&self) -> Result<()> {
+        let old = self.out.join("summary.json");
+        match std::fs::remove_file(&old) {
+            Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
+                Err(e).with_context(|| format!("cannot replace {}", old.display()))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+impl RunResult {
+    pub(super) fn trace(&self) -> RunTrace<'_> {
+        RunTrace {
+            name: &self.summary.controller,
+            rows: &self.rows,
+            ended_early: matches!(self.summary.outcome, Outcome::RolledOver | Outcome::SpunOut),
+        }
+    }
+
+    pub(super) fn into_page(self, scenario: &Scenario) -> PageRun {
+        let settings = scenario.controllers.get(&self.summary.controller);
+        PageRun {
+            description: settings
+                .map_or_else(|| "The driver alone.".into(), |s| s.description.clone()),
+            folder: self.summary.controller.clone(),
+            summary: self.summary,
+            figures: self.figures,
+        }
+    }
+}
+
+/// Makes the runs, `workers` at a time, in the order given.
+pub(super) fn run_all(
+    jobs: &[Job<'_>],
+    workers: usize,
+    interrupt: &Interrupt,
+) -> Vec<Result<RunResult>> {
+    let bars = MultiProgress::new();
+    let next = AtomicUsize::new(0);
+    let results: Vec<Mutex<Option<Result<RunResult>>>> =
+        jobs.iter().map(|_| Mutex::new(None)).collect();
+    std::thread::scope(|scope| {
+        for _ in 0..workers.min(jobs.len()) {
+            scope.spawn(|| {
+                while let Some((job, result)) = {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    jobs.get(index).zip(results.get(index))
+                } {
+                    let bar = bars.add(step_bar(job.scenario, job.controller));
+                    let made = job
+                        .run(interrupt, &bar)
+                        .with_context(|| format!("run {}", job.controller));
+                    bar.finish();
+                    *result.lock().unwrap_or_else(PoisonError::into_inner) = Some(made);
+                }
+            });
+        }
+    });
+    let made = results
+        .into_iter()
+        .map(|r| r.into_inner().unwrap_or_else(PoisonError::into_inner));
+    made.map(|r| r.unwrap_or_else(|| Err(anyhow!("the run was not made: its thread stopped"))))
+        .collect()
+}
+
+pub(super) fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
+}
+
+pub(super) fn step_bar(scenario: &Scenario, name: &str) -> ProgressBar {
+    let style = ProgressStyle::with_template("{prefix:18} {bar:32} {percent:>3} %  {eta} left")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new(scenario.steps() as u64)
+        .with_style(style)
+        .with_prefix(name.to_owned())
+}
+
+/// The two edges of the road, a point every metre.
+pub(super) fn road_edges(scenario: &Scenario) -> Result<Vec<Polyline>> {
+    let course = Course::new(&scenario.course)?;
+    let half = 0.5 * course.width_m();
+    let mut edges = vec![Vec::new(), Vec::new()];
+    let mut station = 0.0;
+    while station <= course.total_length_m() {
+        let p = course.point(station);
+        let (sin, cos) = p.heading_rad.sin_cos();
+        edges[0].push((p.x_m - half * sin, p.y_m + half * cos));
+        edges[1].push((p.x_m + half * sin, p.y_m - half * cos));
+        station += 1.0;
+    }
+    Ok(edges)
+}
+
+pub(super) fn write_figures(folder: &Path, figures: &[Figure]) -> Result<()> {
+    figures
+        .iter()
+        .try_for_each(|f| write_whole(&folder.join(f.name).with_extension("svg"), &f.svg))
+}

@@ -1,0 +1,162 @@
+//! Arranges runs: one, or all of the paper's at once; writes their results.
+
+mod job;
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use deepc_core::data::Dataset;
+use vehicle_dyn::parameters::VehicleParameters;
+
+use crate::cli::{PaperArgs, RecordArgs, RunArgs};
+use crate::interrupt::Interrupt;
+use crate::output::{create_folder, print_json, print_line, write_json};
+use crate::record::{self, record};
+use crate::report::{self, Page, PageRun, RunTrace};
+use crate::scenario::{self, DRIVER, Scenario};
+use crate::summary::Summary;
+use job::{Job, RunResult, cores, road_edges, run_all, step_bar, write_figures};
+
+/// The main job's scenario and controllers.
+const PAPER_SCENARIO: &str = "sedan-s1";
+const PAPER_CONTROLLERS: [&str; 4] = [DRIVER, "rd-deepc-1", "rd-deepc-2", "rd-deepc-1-paper"];
+
+/// `paper`: every controller of the main job, a table and a page.
+///
+/// # Errors
+/// When a run cannot be made or a result cannot be written.
+pub fn paper(args: &PaperArgs, interrupt: &Interrupt) -> Result<()> {
+    let scenario = scenario::load(PAPER_SCENARIO)?;
+    let vehicle = load_vehicle(&scenario.vehicle)?;
+    create_folder(&args.out)?;
+    let dataset = recording(&scenario, &vehicle, args.seed, &args.out)?;
+    let job = |controller: &'static str| Job {
+        scenario: &scenario,
+        vehicle: &vehicle,
+        controller,
+        seed: args.seed,
+        speed_reference_kmh: scenario.speed_reference_kmh,
+        data: (controller != DRIVER).then_some(&dataset),
+        recording: None,
+        out: args.out.join(controller),
+    };
+    let jobs: Vec<Job<'_>> = PAPER_CONTROLLERS.into_iter().map(job).collect();
+    let results = run_all(
+        &jobs,
+        args.jobs.map_or_else(cores, std::num::NonZero::get),
+        interrupt,
+    );
+    let runs = results.into_iter().collect::<Result<Vec<_>>>()?;
+
+    let traces: Vec<RunTrace<'_>> = runs.iter().map(RunResult::trace).collect();
+    let comparison = report::draw_all(&traces, &road_edges(&scenario)?)?;
+    write_figures(&args.out, &comparison)?;
+    let summaries: Vec<Summary> = runs.iter().map(|r| r.summary.clone()).collect();
+    let pages: Vec<PageRun> = runs.into_iter().map(|r| r.into_page(&scenario)).collect();
+    let index = args.out.join("index.html");
+    let page = Page {
+        title: format!("Rollover prevention: {} on {}", vehicle.name, scenario.name),
+        description: &scenario.description,
+        seed: args.seed,
+        comparison: &comparison,
+        runs: &pages,
+    };
+    report::write_index(&index, &page)?;
+    if args.json {
+        print_json(&summaries)
+    } else {
+        print_line(&report::summary_table(&summaries))?;
+        print_line(&format!("figures: {}", index.display()))
+    }
+}
+
+/// `run`: one controller on one scenario.
+///
+/// # Errors
+/// When the run cannot be made or a result cannot be written.
+pub fn single(args: &RunArgs, interrupt: &Interrupt) -> Result<()> {
+    let scenario = scenario::load(&args.scenario)?;
+    let settings = scenario.controller(&args.controller)?;
+    let vehicle = load_vehicle(args.vehicle.as_ref().unwrap_or(&scenario.vehicle))?;
+    let out = args
+        .out
+        .clone()
+        .unwrap_or_else(|| default_folder(&scenario).join(&args.controller));
+    create_folder(&out)?;
+    let data = match (settings, &args.recording) {
+        (None, _) => None,
+        (Some(_), Some(file)) => Some(record::read(file, &scenario)?),
+        (Some(_), None) => Some(recording(&scenario, &vehicle, args.seed, &out)?),
+    };
+    let job = Job {
+        scenario: &scenario,
+        vehicle: &vehicle,
+        controller: &args.controller,
+        seed: args.seed,
+        speed_reference_kmh: args.speed.unwrap_or(scenario.speed_reference_kmh),
+        data: data.as_ref(),
+        recording: args.recording.as_deref().filter(|_| data.is_some()),
+        out,
+    };
+    let bar = step_bar(&scenario, &args.controller);
+    let result = job.run(interrupt, &bar)?;
+    bar.finish_and_clear();
+    if args.json {
+        print_json(&result.summary)
+    } else {
+        print_line(&report::summary_table(std::slice::from_ref(
+            &result.summary,
+        )))?;
+        print_line(&format!("results: {}", job.out.display()))
+    }
+}
+
+/// `record`: the recording alone.
+///
+/// # Errors
+/// When the recording cannot be made or written.
+pub fn record_only(args: &RecordArgs) -> Result<()> {
+    let scenario = scenario::load(&args.scenario)?;
+    let vehicle = load_vehicle(args.vehicle.as_ref().unwrap_or(&scenario.vehicle))?;
+    let out = args
+        .out
+        .clone()
+        .unwrap_or_else(|| default_folder(&scenario));
+    create_folder(&out)?;
+    let (dataset, summary) = record(&scenario, &vehicle, args.seed)?;
+    let path = out.join("recording.csv");
+    record::write(&path, &dataset)?;
+    write_json(&out.join("recording.json"), &summary)?;
+    if args.json {
+        print_json(&summary)
+    } else {
+        print_line(&format!(
+            "{}: {} samples, max |LTR| {:.3}, at most {:.2} m off the path",
+            path.display(),
+            summary.samples,
+            summary.ltr_abs_max,
+            summary.path_deviation_max_m
+        ))
+    }
+}
+
+/// Records, and keeps the recording beside the results made from it.
+fn recording(
+    scenario: &Scenario,
+    vehicle: &VehicleParameters,
+    seed: u64,
+    out: &Path,
+) -> Result<Dataset> {
+    let (dataset, summary) = record(scenario, vehicle, seed)?;
+    record::write(&out.join("recording.csv"), &dataset)?;
+    write_json(&out.join("recording.json"), &summary)?;
+    Ok(dataset)
+}
+
+fn load_vehicle(name_or_path: &str) -> Result<VehicleParameters> {
+    Ok(vehicle_dyn::vehicles::find(name_or_path)?)
+}
+
+fn default_folder(scenario: &Scenario) -> PathBuf {
+    Path::new("out").join(&scenario.name)
+}
