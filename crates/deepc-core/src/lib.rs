@@ -12,6 +12,10 @@
 //! stacked time-major, w = col(w(0), w(1), …), by one function
 //! ([`hankel::stacked_position`]).
 //!
+//! **One sample is the pair (u(k), y(k)): u(k) is held over `[t_k, t_k + Ts)` and y(k) is measured
+//! at the end of that interval.** Most logs write u and y of the same instant in one row; read
+//! them with [`data::OutputTiming::StartOfInterval`].
+//!
 //! ```text
 //!     min   ‖u − u_r‖²_R + ‖y − y_r‖²_Q + λ_g‖g‖² + λ_u‖σ_u‖² + λ_y‖σ_y‖² + Σ (ρs + ½ws²)
 //!   g,u,y,σ
@@ -112,6 +116,9 @@
 //! [`hankel::HankelMatrix::excitation`] first. A plant whose gain changes sign or strongly with
 //! its state: one linear predictor cannot hold both. A good model at hand: predictive control
 //! with that model is cheaper to set up and easier to reason about.
+
+/// The linear algebra crate whose matrices this one takes and gives.
+pub use faer;
 
 pub mod controller;
 pub mod data;

@@ -2,7 +2,7 @@
 
 mod common;
 
-use deepc_core::data::{CsvLayout, DataError, Dataset};
+use deepc_core::data::{CsvLayout, DataError, Dataset, OutputTiming};
 use deepc_core::hankel::{HankelError, HankelMatrix, Horizons};
 use deepc_core::predictor::Predictor;
 use deepc_core::program::{
@@ -16,6 +16,7 @@ fn layout() -> CsvLayout {
         time: "time_s".into(),
         inputs: vec!["valve".into(), "heater".into()],
         outputs: vec!["level".into(), "temperature".into()],
+        outputs_measured: OutputTiming::EndOfInterval,
         sample_time_s: 0.1,
     }
 }
@@ -23,7 +24,12 @@ fn layout() -> CsvLayout {
 fn read(text: &str) -> Result<Dataset, DataError> {
     let layout = layout();
     let mut data = Dataset::new(layout.sample_time_s, &layout.inputs, &layout.outputs)?;
-    data.push_csv(text.as_bytes(), "run.csv", &layout.time)?;
+    data.push_csv(
+        text.as_bytes(),
+        "run.csv",
+        &layout.time,
+        layout.outputs_measured,
+    )?;
     Ok(data)
 }
 
@@ -72,6 +78,7 @@ fn what_is_written_is_read_back_bit_by_bit() {
         time: "t".into(),
         inputs: vec!["valve".into(), "heater".into()],
         outputs: vec!["level".into()],
+        outputs_measured: OutputTiming::EndOfInterval,
         sample_time_s: 0.01,
     };
     let back = Dataset::read_csv(&layout, &files).unwrap();
@@ -95,7 +102,12 @@ fn nan_is_reported_with_channel_sample_line_and_record() {
     let mut data = read(&rows(5)).unwrap();
     let bad = rows(5).replace("0.30000000000000004,3,1.5,6,20", "0.3,3,1.5,NaN,20");
     says(
-        data.push_csv(bad.as_bytes(), "second.csv", "time_s"),
+        data.push_csv(
+            bad.as_bytes(),
+            "second.csv",
+            "time_s",
+            OutputTiming::EndOfInterval,
+        ),
         &[
             "channel `level` is NaN at sample 3 (line 5) of record 2",
             "second.csv",
@@ -432,5 +444,53 @@ fn a_moment_of_the_wrong_shape_is_refused_with_its_name() {
     says(
         program.set_moment(&moment),
         &["the past of the outputs is 2×4, expected 4×2"],
+    );
+}
+
+#[test]
+fn inputs_are_paired_with_the_outputs_of_the_next_row_where_a_log_says_so() {
+    let text = "time_s,u,v,y,z\n0,1,10,100,1000\n1,2,20,200,2000\n2,3,30,300,3000\n";
+    let mut data = Dataset::new(1.0, ["u", "v"], ["y", "z"]).unwrap();
+    let start = OutputTiming::StartOfInterval;
+    data.push_csv(text.as_bytes(), "log.csv", "time_s", start)
+        .unwrap();
+    let record = &data.records()[0];
+    assert_eq!(record.inputs(), faer::mat![[1.0, 10.0], [2.0, 20.0]]);
+    assert_eq!(
+        record.outputs(),
+        faer::mat![[200.0, 2000.0], [300.0, 3000.0]]
+    );
+
+    let broken = text.replace("2000", "NaN");
+    let message = data
+        .push_csv(broken.as_bytes(), "log.csv", "time_s", start)
+        .unwrap_err();
+    let message = message.to_string();
+    assert!(
+        message.contains("`z` is NaN at sample 0 (line 3)"),
+        "{message}"
+    );
+
+    let one_row = "time_s,u,v,y,z\n0,1,10,100,1000\n";
+    let message = data
+        .push_csv(one_row.as_bytes(), "log.csv", "time_s", start)
+        .unwrap_err();
+    assert!(message.to_string().contains("no samples"), "{message}");
+}
+
+#[test]
+fn absurd_sizes_are_refused_and_do_not_overflow() {
+    let mut data = Dataset::new(1.0, ["u"], ["y"]).unwrap();
+    data.push_rows(&[1.0, -1.0, 2.0, 0.5], &[0.0, 1.0, 2.0, 3.0])
+        .unwrap();
+    let message = HankelMatrix::build(&data, Horizons::new(usize::MAX, 1)).unwrap_err();
+    assert!(message.to_string().contains("4 samples"), "{message}");
+    let hankel = HankelMatrix::build(&data, Horizons::new(1, 1)).unwrap();
+    let message = hankel
+        .require_persistently_exciting(usize::MAX / 2)
+        .unwrap_err();
+    assert!(
+        message.to_string().contains("too few samples: 4"),
+        "{message}"
     );
 }

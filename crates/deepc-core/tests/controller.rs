@@ -12,7 +12,10 @@ use deepc_core::program::{
     Bounds, CondensedProgram, DeepcProgram, DeepcSettings, Normalisation, OutputBounds,
     Regularisation, Slack, SparseProgram,
 };
-use deepc_core::solver::{ActiveRows, ClarabelDirect, ClarabelSettings, QpStatus, SolveBudget};
+use deepc_core::solver::{
+    ActiveRows, ClarabelDirect, ClarabelSettings, QpProblem, QpSolution, QpSolver, QpStatus,
+    QpVectors, SolveBudget, SolverError,
+};
 use faer::{Col, Mat};
 
 /// Two coupled, slightly oscillating modes; two inputs, two outputs.
@@ -258,11 +261,114 @@ fn without_measurements_the_plan_is_followed_to_its_end_and_its_last_input_held(
         );
         assert!((step.input[0] - plan[(row, 0)]).abs() < 1e-12);
     }
+    let last = controller.step().input.clone();
     for _ in 0..3 {
         let step = controller.decide(&reference);
         assert_eq!(step.origin, Origin::Hold);
-        assert!(step.input.iter().all(|u| u.is_finite()));
+        assert_eq!(step.input, last, "the input applied last is held");
     }
+}
+
+#[test]
+fn an_input_reported_with_a_lost_output_is_the_one_held() {
+    let mut controller = controller(1);
+    let reference = controller.new_reference();
+    controller.decide(&reference);
+    // Somebody else applied another input, and no output was measured.
+    let applied = [0.25, -0.125];
+    controller.observe(&applied, &[f64::NAN; 2]);
+    let step = controller.decide(&reference);
+    assert_eq!(
+        (step.origin, step.fault),
+        (Origin::Hold, Some(Fault::MeasurementNotFinite))
+    );
+    assert_eq!(step.input, applied);
+}
+
+#[test]
+fn a_bad_sample_long_before_a_decision_does_not_block_it() {
+    let mut controller = controller(1);
+    controller.observe(&[0.0; 2], &[f64::NAN, 0.0]);
+    for _ in 0..20 {
+        controller.observe(&[0.0; 2], &[0.0; 2]);
+    }
+    let reference = controller.new_reference();
+    let step = controller.decide(&reference);
+    assert_eq!(step.fault, None);
+    assert!(
+        matches!(step.origin, Origin::Solver | Origin::Unconstrained),
+        "{:?}",
+        step.origin
+    );
+}
+
+#[test]
+fn a_failed_solve_with_a_plan_at_hand_follows_the_plan() {
+    let program = SparseProgram::new(&predictor(), &settings()).unwrap();
+    let solver = Failing {
+        inner: ClarabelDirect::new(program.qp(), ClarabelSettings::default()).unwrap(),
+        solves: 0,
+    };
+    let mut controller =
+        DeepcController::new(Box::new(program), Box::new(solver), horizon(1)).unwrap();
+    let run = run_closed_loop(&mut LtiPlant::at_rest(), &mut controller, 6, to_the_target).unwrap();
+    assert_eq!(run.origins[4..], [Origin::Solver, Origin::Fallback]);
+    let step = controller.step();
+    assert_eq!(step.fault, Some(Fault::SolveFailed));
+    assert_eq!(step.status, QpStatus::InvalidData);
+}
+
+/// Solves once, then breaks down.
+struct Failing {
+    inner: ClarabelDirect,
+    solves: u32,
+}
+
+impl QpSolver for Failing {
+    fn name(&self) -> &'static str {
+        "failing"
+    }
+    fn problem(&self) -> &QpProblem {
+        self.inner.problem()
+    }
+    fn update(&mut self, vectors: QpVectors<'_>) -> Result<(), SolverError> {
+        self.inner.update(vectors)
+    }
+    fn solve(&mut self, budget: &SolveBudget) -> &QpSolution {
+        self.solves += 1;
+        if self.solves > 1 {
+            // NaN in q is a solver's own way to fail.
+            let variables = vec![f64::NAN; self.problem().variable_count()];
+            let rows = vec![0.0; self.problem().row_count()];
+            let broken = QpVectors {
+                linear: &variables,
+                lower: &rows,
+                upper: &rows,
+            };
+            self.inner.update(broken).unwrap();
+        }
+        self.inner.solve(budget)
+    }
+    fn solution(&self) -> &QpSolution {
+        self.inner.solution()
+    }
+    fn forget(&mut self) {
+        self.inner.forget();
+    }
+}
+
+#[test]
+fn a_solver_of_another_program_of_the_same_size_is_refused() {
+    let program = CondensedProgram::new(&predictor(), &settings()).unwrap();
+    let mut other = settings();
+    other.input_weights[0] *= 2.0;
+    let other = CondensedProgram::new(&predictor(), &other).unwrap();
+    let solver = ActiveRows::new(other.qp(), ClarabelSettings::default()).unwrap();
+    let message = DeepcController::new(Box::new(program), Box::new(solver), horizon(1))
+        .err()
+        .expect("the weights differ")
+        .to_string();
+    assert!(message.contains("another program of"), "{message}");
 }
 
 #[test]

@@ -4,15 +4,18 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 use deepc_core::controller::Plant;
-use deepc_core::data::{CsvLayout, Dataset};
+use deepc_core::data::{CsvLayout, Dataset, OutputTiming};
 use faer::Mat;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 use serde::Serialize;
+use vehicle_dyn::metrics::Outcome;
 use vehicle_dyn::parameters::VehicleParameters;
 
 use crate::closed_loop::{DrivenVehicle, INPUTS, OUTPUTS};
+use crate::interrupt::Interrupt;
+use crate::output::write_whole;
 use crate::scenario::Scenario;
 
 /// Names of the input columns of a recording.
@@ -47,6 +50,7 @@ pub fn record(
     scenario: &Scenario,
     vehicle: &VehicleParameters,
     seed: u64,
+    interrupt: &Interrupt,
 ) -> Result<(Dataset, RecordingSummary)> {
     let recipe = &scenario.recording;
     let mut plant = DrivenVehicle::new(scenario, vehicle, &recipe.course, recipe.target_speed_kmh)?;
@@ -58,6 +62,7 @@ pub fn record(
     let mut outputs: Vec<[f64; OUTPUTS]> = Vec::with_capacity(samples);
     let mut deviation_m = 0.0_f64;
     for _ in 0..samples {
+        interrupt.check("while recording", "no recording was written")?;
         let input = [
             plant.driver_steering_deg() + steering_noise.sample(&mut noise),
             recipe.target_speed_kmh + speed_noise.sample(&mut noise),
@@ -68,7 +73,7 @@ pub fn record(
         outputs.push(output);
         deviation_m = deviation_m.max(plant.location().lateral_offset_m.abs());
         anyhow::ensure!(
-            !plant.ended(),
+            plant.outcome() == Outcome::Completed,
             "the vehicle did not survive the recording: {} at {:.2} s with seed {seed}; record at a lower target speed or on wider turns",
             plant.outcome(),
             plant.observation().time_s,
@@ -102,9 +107,12 @@ fn normal(standard_deviation: f64) -> Result<Normal<f64>> {
 /// # Errors
 /// When the file cannot be written.
 pub fn write(path: &Path, dataset: &Dataset) -> Result<()> {
-    dataset
-        .write_csv(1, path, TIME_COLUMN)
-        .context("the recording is not saved; choose another folder with --out")
+    let mut text = Vec::new();
+    dataset.write_csv_to(1, &mut text, &path.display().to_string(), TIME_COLUMN)?;
+    write_whole(
+        path,
+        &String::from_utf8(text).context("channel names are UTF-8")?,
+    )
 }
 
 /// Reads a recording with the scenario's sample time.
@@ -116,6 +124,7 @@ pub fn read(path: &Path, scenario: &Scenario) -> Result<Dataset> {
         time: TIME_COLUMN.to_owned(),
         inputs: INPUT_COLUMNS.map(str::to_owned).to_vec(),
         outputs: OUTPUT_COLUMNS.map(str::to_owned).to_vec(),
+        outputs_measured: OutputTiming::EndOfInterval,
         sample_time_s: scenario.sample_time_s,
     };
     Dataset::read_csv(&layout, &[path]).context("the recording cannot be used")

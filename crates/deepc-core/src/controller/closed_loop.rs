@@ -23,12 +23,15 @@ pub struct ClosedLoopRun {
 /// # Errors
 /// Plant and controller differ in sizes or sample time, the reference does not fit, or the plant
 /// cannot go on.
-pub fn run_closed_loop(
+pub fn run_closed_loop<E>(
     plant: &mut dyn Plant,
     controller: &mut dyn Controller,
     steps: usize,
-    mut set_reference: impl FnMut(usize, &mut Reference) -> Result<(), ControllerError>,
-) -> Result<ClosedLoopRun, PlantError> {
+    mut set_reference: impl FnMut(usize, &mut Reference) -> Result<(), E>,
+) -> Result<ClosedLoopRun, PlantError>
+where
+    E: Into<Box<dyn std::error::Error + Send + Sync>>,
+{
     check_pair(plant, controller).map_err(PlantError::new)?;
     let mut reference = controller.new_reference();
     let mut run = ClosedLoopRun {

@@ -107,6 +107,13 @@ impl DeepcController {
                 rows: sizes.1,
             });
         }
+        // The optimum for other weights or data would look like a solution of this program.
+        if ours != theirs {
+            return Err(ControllerError::SolverOfOtherProgram {
+                variables: sizes.0,
+                rows: sizes.1,
+            });
+        }
         Ok(Self {
             window: Window::new(shape.horizons.past, shape.inputs, shape.outputs),
             plan_age: None,
@@ -253,16 +260,22 @@ impl DeepcController {
 
     /// Appends a sample; entries that are not finite are replaced by the plan's prediction.
     fn take_sample(&mut self, input: &[f64], output: &[f64], fault: Option<Fault>) {
-        self.awaits_sample = false;
+        let decided = std::mem::take(&mut self.awaits_sample);
         let predicted = self
             .plan_age
             .filter(|&age| age < self.program.shape().horizons.future);
         self.plan_age = self.plan_age.map(|age| age + 1);
         let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
+        // What was applied: as reported where that can be trusted, else as decided.
+        let reported = input.len() == self.last_input.len() && finite(input);
+        if reported || decided {
+            repair(&mut self.repaired_input, input, self.step.input.iter());
+            self.last_input.copy_from_slice(&self.repaired_input);
+            self.input_applied = true;
+        }
         if fault.is_none() && finite(input) && finite(output) {
             self.window.push(input, output, false);
-            self.last_input.copy_from_slice(input);
-            self.input_applied = true;
+            self.sample_fault = None;
             return;
         }
         self.sample_fault = Some(fault.unwrap_or(Fault::MeasurementNotFinite));
@@ -271,7 +284,6 @@ impl DeepcController {
             return;
         };
         let plan = self.program.plan();
-        repair(&mut self.repaired_input, input, self.step.input.iter());
         repair(
             &mut self.repaired_output,
             output,
@@ -341,7 +353,6 @@ impl Controller for DeepcController {
         self.input_applied = false;
         self.awaits_sample = false;
         self.sample_fault = None;
-        self.step.clear();
-        self.step.input.fill(0.0);
+        self.step.reset();
     }
 }

@@ -61,6 +61,17 @@ pub enum ControllerError {
         /// Rows of the program.
         rows: usize,
     },
+    /// The solver was set up for a program of the same size with other matrices.
+    #[error(
+        "the solver was set up for another program of {variables} variables and {rows} rows: its \
+         weights or data differ; set it up with this program's `qp()`"
+    )]
+    SolverOfOtherProgram {
+        /// Variables of both.
+        variables: usize,
+        /// Rows of both.
+        rows: usize,
+    },
     /// A reference does not fit.
     #[error(
         "the {name} reference is {rows}×{columns}, expected at least 1 row and {expected} columns \

@@ -52,7 +52,8 @@ pub struct Step {
     pub origin: Origin,
     /// What went wrong, if anything did.
     pub fault: Option<Fault>,
-    /// How the solve of this step ended; [`QpStatus::NotRun`] if there was none.
+    /// How the plan made in this step ended (`Solved` for an unconstrained optimum);
+    /// [`QpStatus::NotRun`] if none was made.
     pub status: QpStatus,
     /// Iterations of the solver in this step.
     pub iterations: u32,
@@ -89,6 +90,15 @@ impl Step {
             predicted_inputs: Mat::zeros(horizon, inputs),
             predicted_outputs: Mat::zeros(horizon, outputs),
         }
+    }
+
+    /// As before the first decision.
+    pub(super) fn reset(&mut self) {
+        self.clear();
+        self.origin = Origin::Passthrough;
+        self.input.fill(0.0);
+        self.solve_time = Duration::ZERO;
+        self.repaired_samples = 0;
     }
 
     /// Forgets the previous decision but for the input.

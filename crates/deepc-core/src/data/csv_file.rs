@@ -14,6 +14,22 @@ use super::error::{DataError, SamplePlace};
 /// Room for stamps rounded when printed; a lost or repeated sample is 100 times as far.
 const TIME_TOLERANCE: f64 = 0.01;
 
+/// When the outputs of a row were measured, relative to the inputs of the same row.
+///
+/// `DeePC` pairs u(k), held over `[t_k, t_k + Ts)`, with what is measured at the **end** of that
+/// interval. A recording that pairs it with what was measured at the start teaches the controller
+/// that its inputs act a sample later than they do, and it overreacts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OutputTiming {
+    /// At the end of the interval over which the row's inputs were applied.
+    EndOfInterval,
+    /// When the row's inputs began to be applied, as in most logs that write all they know at one
+    /// instant. The inputs of a row are then paired with the outputs of the next one; the first
+    /// outputs and the last inputs are dropped.
+    StartOfInterval,
+}
+
 /// Which columns of a comma-separated file are the time, the inputs and the outputs.
 ///
 /// The file has one header line; it may have further columns, and its columns may stand in
@@ -27,6 +43,8 @@ pub struct CsvLayout {
     pub inputs: Vec<String>,
     /// Names of the output columns; they become the output channels, in this order.
     pub outputs: Vec<String>,
+    /// When the outputs of a row were measured.
+    pub outputs_measured: OutputTiming,
     /// Sample time Ts in seconds.
     pub sample_time_s: f64,
 }
@@ -46,7 +64,12 @@ impl Dataset {
                 file: name.clone(),
                 source,
             })?;
-            data.push_csv(BufReader::new(file), &name, &layout.time)?;
+            data.push_csv(
+                BufReader::new(file),
+                &name,
+                &layout.time,
+                layout.outputs_measured,
+            )?;
         }
         Ok(data)
     }
@@ -61,6 +84,7 @@ impl Dataset {
         reader: R,
         name: &str,
         time_column: &str,
+        outputs_measured: OutputTiming,
     ) -> Result<(), DataError> {
         let mut reader = csv::ReaderBuilder::new()
             .trim(csv::Trim::All)
@@ -108,12 +132,20 @@ impl Dataset {
             return Err(DataError::HeaderOnly { file: name.into() });
         }
         let (m, p) = (self.inputs(), self.outputs());
+        let outputs_later = match outputs_measured {
+            OutputTiming::EndOfInterval => 0,
+            OutputTiming::StartOfInterval => 1,
+        };
+        let samples = lines.len() - outputs_later;
         self.push_from(
-            Mat::from_fn(lines.len(), m, |k, i| input_values[k * m + i]),
-            Mat::from_fn(lines.len(), p, |k, i| output_values[k * p + i]),
+            Mat::from_fn(samples, m, |k, i| input_values[k * m + i]),
+            Mat::from_fn(samples, p, |k, i| {
+                output_values[(k + outputs_later) * p + i]
+            }),
             Origin {
                 file: Some(name),
                 lines: Some(&lines),
+                outputs_later,
             },
         )
     }

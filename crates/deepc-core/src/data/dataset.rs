@@ -38,8 +38,10 @@ impl Record {
 #[derive(Debug, Default, Clone, Copy)]
 pub(super) struct Origin<'a> {
     pub file: Option<&'a str>,
-    /// Line of each sample.
+    /// Line of each row of the file.
     pub lines: Option<&'a [u64]>,
+    /// Rows between the inputs of a sample and its outputs.
+    pub outputs_later: usize,
 }
 
 /// Recorded inputs and outputs of one plant: a sample time, m named input channels, p named
@@ -100,7 +102,8 @@ impl Dataset {
         })
     }
 
-    /// Adds a record: `inputs` T×m, `outputs` T×p, rows are time.
+    /// Adds a record: `inputs` T×m, `outputs` T×p, rows are time. Row k of the outputs was measured
+    /// at the **end** of the interval over which row k of the inputs was applied.
     ///
     /// # Errors
     /// Wrong number of columns, different numbers of rows, no rows, or a value that is NaN or
@@ -185,9 +188,11 @@ impl Dataset {
     ) -> Result<(), DataError> {
         // Row by row, so that the first bad sample in time is the one reported.
         for sample in 0..inputs.nrows() {
-            let values = (inputs.row(sample).iter().zip(&self.input_names))
-                .chain(outputs.row(sample).iter().zip(&self.output_names));
-            for (&value, channel) in values {
+            let input = inputs.row(sample).iter().zip(&self.input_names);
+            let output = outputs.row(sample).iter().zip(&self.output_names);
+            let values = (input.map(|pair| (pair, sample)))
+                .chain(output.map(|pair| (pair, sample + origin.outputs_later)));
+            for ((&value, channel), row) in values {
                 if !value.is_finite() {
                     return Err(DataError::NotFinite {
                         channel: channel.clone(),
@@ -195,7 +200,7 @@ impl Dataset {
                         place: SamplePlace {
                             record,
                             sample,
-                            line: origin.lines.and_then(|lines| lines.get(sample).copied()),
+                            line: origin.lines.and_then(|lines| lines.get(row).copied()),
                             file: origin.file.map(Into::into),
                         },
                     });

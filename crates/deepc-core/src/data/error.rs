@@ -152,7 +152,7 @@ pub enum DataError {
         available: usize,
     },
     /// A file could not be opened, read or written.
-    #[error("cannot {action} `{file}`: {source}")]
+    #[error("cannot {action} `{file}`")]
     Io {
         /// `open`, `read` or `write`.
         action: &'static str,
@@ -162,7 +162,7 @@ pub enum DataError {
         source: std::io::Error,
     },
     /// The CSV reader gave up (ragged rows, invalid UTF-8, …).
-    #[error("`{file}` is not a readable comma-separated file: {source}")]
+    #[error("`{file}` is not a readable comma-separated file")]
     Csv {
         /// File name.
         file: String,
@@ -217,7 +217,8 @@ pub enum DataError {
     /// A time stamp is off the uniform grid.
     #[error(
         "`{file}`, line {line}: time is {found} s, expected {expected} s for a sample time of \
-         {sample_time_s} s; sort and resample the recording, or split it into records at the gap"
+         {sample_time_s} s; check the sample time, \
+         sort and resample the recording, or split it into records at the gap"
     )]
     NonUniformTime {
         /// File name.

@@ -8,6 +8,6 @@ mod csv_file;
 mod dataset;
 mod error;
 
-pub use csv_file::CsvLayout;
+pub use csv_file::{CsvLayout, OutputTiming};
 pub use dataset::{Dataset, Record};
 pub use error::{DataError, SamplePlace};

@@ -20,7 +20,7 @@ pub enum HankelError {
     #[error(
         "record {record} has {samples} samples, fewer than one window of past + future = {window}; \
          leave it out, shorten the horizons, or record more (persistent excitation needs at least \
-         {needed} samples in one record)"
+         {needed} samples in one record, and (m + 1) more for each order of the plant)"
     )]
     RecordTooShort {
         /// Record number, from 1.

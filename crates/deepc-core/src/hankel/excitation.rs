@@ -81,7 +81,9 @@ impl ExcitationReport {
     pub(super) fn measure(hankel: &HankelMatrix, plant_order: usize) -> Result<Self, HankelError> {
         let data = hankel.dataset();
         let window = hankel.horizons().window();
-        let order = window + plant_order;
+        // No record holds a window longer than all samples, so a longer order changes no rank.
+        let order = window.saturating_add(plant_order);
+        let depth = order.min(data.samples() + 1);
         let m = data.inputs();
         let inputs: Vec<_> = data.records().iter().map(Record::inputs).collect();
         let outputs: Vec<_> = data.records().iter().map(Record::outputs).collect();
@@ -89,7 +91,7 @@ impl ExcitationReport {
         let output_scales = channel_scales(&outputs);
         let scaled_inputs: Vec<_> = inputs.iter().map(|s| scaled(*s, &input_scales)).collect();
         let views: Vec<_> = scaled_inputs.iter().map(Mat::as_ref).collect();
-        let input_hankel = block_hankel(&views, order);
+        let input_hankel = block_hankel(&views, depth);
         let input_rank = Rank::measure(input_hankel.as_ref())?;
         let stacked = hankel.scaled_rows(&input_scales, &output_scales);
         let stacked_rank = Rank::measure(stacked.as_ref())?;
@@ -97,11 +99,11 @@ impl ExcitationReport {
         let mut input_channels = Vec::with_capacity(m);
         for (channel, name) in data.input_names().iter().enumerate() {
             // Full joint rank implies full rank of every channel.
-            let rank = if input_rank.rank == m * order {
+            let rank = if input_rank.rank == m.saturating_mul(order) {
                 order
             } else {
                 let alone: Vec<_> = views.iter().map(|s| s.subcols(channel, 1)).collect();
-                Rank::measure(block_hankel(&alone, order).as_ref())?.rank
+                Rank::measure(block_hankel(&alone, depth).as_ref())?.rank
             };
             input_channels.push(ChannelExcitation {
                 name: name.clone(),
@@ -120,15 +122,15 @@ impl ExcitationReport {
             window,
             plant_order,
             samples: data.samples(),
-            samples_needed: (m + 1) * order - 1,
+            samples_needed: (m + 1).saturating_mul(order) - 1,
             records: data.records().len(),
             columns: input_hankel.ncols(),
-            columns_needed: m * order,
+            columns_needed: m.saturating_mul(order),
             input_rank: input_rank.rank,
-            input_rank_needed: m * order,
+            input_rank_needed: m.saturating_mul(order),
             input_gap: gap(&input_rank),
             stacked_rank: stacked_rank.rank,
-            stacked_rank_without_noise: m * window + plant_order,
+            stacked_rank_without_noise: (m * window).saturating_add(plant_order),
             stacked_gap: gap(&stacked_rank),
             input_channels,
             constant_outputs,
@@ -143,7 +145,7 @@ impl ExcitationReport {
 
     /// What is missing and what to record; for a report of inputs that do not excite.
     pub(super) fn complaint(&self) -> String {
-        let order = self.window + self.plant_order;
+        let order = self.window.saturating_add(self.plant_order);
         let mut parts = vec![format!(
             "their Hankel matrix of order L + n = {} + {} has rank {}, needed {}",
             self.window, self.plant_order, self.input_rank, self.input_rank_needed

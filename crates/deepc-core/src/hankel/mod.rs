@@ -36,7 +36,7 @@ impl Horizons {
     /// Window L = `T_ini` + N.
     #[must_use]
     pub fn window(&self) -> usize {
-        self.past + self.future
+        self.past.saturating_add(self.future)
     }
 }
 
@@ -142,7 +142,7 @@ impl HankelMatrix {
                     record: index + 1,
                     samples: record.samples(),
                     window,
-                    needed: (m + 1) * window - 1,
+                    needed: (m + 1).saturating_mul(window) - 1,
                 });
             }
         }

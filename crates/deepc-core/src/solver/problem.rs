@@ -36,7 +36,7 @@ impl SoftPenalty {
 }
 
 /// A constant matrix, dense or sparse.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum QpMatrix {
     /// Dense.
     Dense(Mat<f64>),
@@ -144,7 +144,7 @@ pub struct QpVectors<'a> {
 }
 
 /// The constant part of a quadratic program: P (n×n), A (r×n) and the soft rows.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct QpProblem {
     hessian: QpMatrix,
     rows: QpMatrix,
