@@ -62,7 +62,7 @@ pub struct RunArgs {
     #[arg(long, value_name = "FILE")]
     pub recording: Option<PathBuf>,
     /// Speed at the start and reference afterwards, instead of the scenario's.
-    #[arg(long, value_name = "KMH", value_parser = speed_kmh)]
+    #[arg(long, value_name = "KMH", value_parser = speed_kmh, allow_negative_numbers = true)]
     pub speed: Option<f64>,
     /// Print the summary as JSON on standard output.
     #[arg(long)]

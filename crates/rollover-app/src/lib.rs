@@ -32,6 +32,6 @@ pub fn execute(command: &cli::Command, interrupt: &Interrupt) -> Result<()> {
     match command {
         cli::Command::Paper(args) => campaign::paper(args, interrupt),
         cli::Command::Run(args) => campaign::single(args, interrupt),
-        cli::Command::Record(args) => campaign::record_only(args),
+        cli::Command::Record(args) => campaign::record_only(args, interrupt),
     }
 }

@@ -27,7 +27,8 @@ fn drive(name: &str, seed: u64, speed_reference_kmh: f64) -> Finished {
         .controller(name)
         .expect("the scenario has this controller");
     let controller = settings.map(|settings| {
-        let (data, _) = record(&scenario, &vehicle, seed).expect("the recording is survived");
+        let (data, _) = record(&scenario, &vehicle, seed, &Interrupt::default())
+            .expect("the recording is survived");
         controller(&scenario, settings, &data).expect("the recording excites the plant")
     });
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
@@ -91,7 +92,8 @@ fn the_driver_alone_survives_at_100() {
 fn recordings_stay_below_lift_off() {
     let (scenario, vehicle) = scenario();
     for seed in 0..JUDGED_SEEDS.end {
-        let (_, summary) = record(&scenario, &vehicle, seed).expect("the recording is survived");
+        let (_, summary) = record(&scenario, &vehicle, seed, &Interrupt::default())
+            .expect("the recording is survived");
         let ltr = summary.ltr_abs_max;
         assert!(
             (0.9..1.0).contains(&ltr),

@@ -41,8 +41,6 @@ pub(super) struct RunResult {
 impl Job<'_> {
     /// Runs, then writes summary and figures beside the log.
     pub(super) fn run(&self, interrupt: &Interrupt, bar: &ProgressBar) -> Result<RunResult> {
-        create_folder(&self.out)?;
-        self.remove_old_results()?;
         let settings = self.scenario.controller(self.controller)?;
         let controller = match (settings, self.data) {
             (Some(settings), Some(data)) => {
@@ -50,6 +48,9 @@ impl Job<'_> {
             }
             _ => None,
         };
+        interrupt.check("before the first step", "nothing was written")?;
+        create_folder(&self.out)?;
+        remove_old_results(&self.out)?;
         let run = Run {
             scenario: self.scenario,
             vehicle: self.vehicle,
@@ -82,17 +83,23 @@ impl Job<'_> {
         write_figures(&self.out, &result.figures)?;
         Ok(result)
     }
+}
 
-    /// A summary of an earlier run beside a fresh log would be a lie if this run is interrupted.
-    fn remove_old_results(&self) -> Result<()> {
-        let old = self.out.join("summary.json");
+/// Removes what an earlier run or campaign derived from its logs: beside fresh logs it would lie if
+/// this one is interrupted.
+pub(super) fn remove_old_results(folder: &Path) -> Result<()> {
+    let names = ["summary.json", "index.html"].map(str::to_owned);
+    let figures = report::FIGURE_NAMES.map(|name| format!("{name}.svg"));
+    for name in names.iter().chain(&figures) {
+        let old = folder.join(name);
         match std::fs::remove_file(&old) {
             Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
-                Err(e).with_context(|| format!("cannot replace {}", old.display()))
+                return Err(e).with_context(|| format!("cannot replace {}", old.display()));
             }
-            _ => Ok(()),
+            _ => {}
         }
     }
+    Ok(())
 }
 
 impl RunResult {
@@ -129,10 +136,12 @@ pub(super) fn run_all(
     std::thread::scope(|scope| {
         for _ in 0..workers.min(jobs.len()) {
             scope.spawn(|| {
-                while let Some((job, result)) = {
-                    let index = next.fetch_add(1, Ordering::Relaxed);
-                    jobs.get(index).zip(results.get(index))
-                } {
+                // A run that has not begun when the user stops the program leaves what an earlier
+                // one wrote in its folder.
+                while let Some((job, result)) = (!interrupt.is_raised())
+                    .then(|| next.fetch_add(1, Ordering::Relaxed))
+                    .and_then(|index| jobs.get(index).zip(results.get(index)))
+                {
                     let bar = bars.add(step_bar(job.scenario, job.controller));
                     let made = job
                         .run(interrupt, &bar)
@@ -146,7 +155,7 @@ pub(super) fn run_all(
     let made = results
         .into_iter()
         .map(|r| r.into_inner().unwrap_or_else(PoisonError::into_inner));
-    made.map(|r| r.unwrap_or_else(|| Err(anyhow!("the run was not made: its thread stopped"))))
+    made.map(|r| r.unwrap_or_else(|| Err(anyhow!("the run was not begun"))))
         .collect()
 }
 

@@ -4,7 +4,7 @@ mod job;
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use deepc_core::data::Dataset;
 use vehicle_dyn::parameters::VehicleParameters;
 
@@ -15,7 +15,9 @@ use crate::record::{self, record};
 use crate::report::{self, Page, PageRun, RunTrace};
 use crate::scenario::{self, DRIVER, Scenario};
 use crate::summary::Summary;
-use job::{Job, RunResult, cores, road_edges, run_all, step_bar, write_figures};
+use job::{
+    Job, RunResult, cores, remove_old_results, road_edges, run_all, step_bar, write_figures,
+};
 
 /// The main job's scenario and controllers.
 const PAPER_SCENARIO: &str = "sedan-s1";
@@ -29,7 +31,8 @@ pub fn paper(args: &PaperArgs, interrupt: &Interrupt) -> Result<()> {
     let scenario = scenario::load(PAPER_SCENARIO)?;
     let vehicle = load_vehicle(&scenario.vehicle)?;
     create_folder(&args.out)?;
-    let dataset = recording(&scenario, &vehicle, args.seed, &args.out)?;
+    remove_old_results(&args.out)?;
+    let dataset = recording(&scenario, &vehicle, args.seed, &args.out, interrupt)?;
     let job = |controller: &'static str| Job {
         scenario: &scenario,
         vehicle: &vehicle,
@@ -46,7 +49,7 @@ pub fn paper(args: &PaperArgs, interrupt: &Interrupt) -> Result<()> {
         args.jobs.map_or_else(cores, std::num::NonZero::get),
         interrupt,
     );
-    let runs = results.into_iter().collect::<Result<Vec<_>>>()?;
+    let runs = all_or_every_error(results)?;
 
     let traces: Vec<RunTrace<'_>> = runs.iter().map(RunResult::trace).collect();
     let comparison = report::draw_all(&traces, &road_edges(&scenario)?)?;
@@ -78,6 +81,15 @@ pub fn single(args: &RunArgs, interrupt: &Interrupt) -> Result<()> {
     let scenario = scenario::load(&args.scenario)?;
     let settings = scenario.controller(&args.controller)?;
     let vehicle = load_vehicle(args.vehicle.as_ref().unwrap_or(&scenario.vehicle))?;
+    let speed_reference_kmh = args.speed.unwrap_or(scenario.speed_reference_kmh);
+    let [lowest, highest] = scenario.bounds.target_speed_kmh;
+    ensure!(
+        settings.is_none() || (lowest..=highest).contains(&speed_reference_kmh),
+        "--speed {speed_reference_kmh} is outside what {} may command: \
+         bounds.target_speed_kmh = [{lowest}, {highest}] in scenario {}",
+        args.controller,
+        scenario.name
+    );
     let out = args
         .out
         .clone()
@@ -86,14 +98,14 @@ pub fn single(args: &RunArgs, interrupt: &Interrupt) -> Result<()> {
     let data = match (settings, &args.recording) {
         (None, _) => None,
         (Some(_), Some(file)) => Some(record::read(file, &scenario)?),
-        (Some(_), None) => Some(recording(&scenario, &vehicle, args.seed, &out)?),
+        (Some(_), None) => Some(recording(&scenario, &vehicle, args.seed, &out, interrupt)?),
     };
     let job = Job {
         scenario: &scenario,
         vehicle: &vehicle,
         controller: &args.controller,
         seed: args.seed,
-        speed_reference_kmh: args.speed.unwrap_or(scenario.speed_reference_kmh),
+        speed_reference_kmh,
         data: data.as_ref(),
         recording: args.recording.as_deref().filter(|_| data.is_some()),
         out,
@@ -115,7 +127,7 @@ pub fn single(args: &RunArgs, interrupt: &Interrupt) -> Result<()> {
 ///
 /// # Errors
 /// When the recording cannot be made or written.
-pub fn record_only(args: &RecordArgs) -> Result<()> {
+pub fn record_only(args: &RecordArgs, interrupt: &Interrupt) -> Result<()> {
     let scenario = scenario::load(&args.scenario)?;
     let vehicle = load_vehicle(args.vehicle.as_ref().unwrap_or(&scenario.vehicle))?;
     let out = args
@@ -123,7 +135,7 @@ pub fn record_only(args: &RecordArgs) -> Result<()> {
         .clone()
         .unwrap_or_else(|| default_folder(&scenario));
     create_folder(&out)?;
-    let (dataset, summary) = record(&scenario, &vehicle, args.seed)?;
+    let (dataset, summary) = record(&scenario, &vehicle, args.seed, interrupt)?;
     let path = out.join("recording.csv");
     record::write(&path, &dataset)?;
     write_json(&out.join("recording.json"), &summary)?;
@@ -140,14 +152,32 @@ pub fn record_only(args: &RecordArgs) -> Result<()> {
     }
 }
 
+/// The runs, or one error that tells of all that were not made.
+fn all_or_every_error(results: Vec<Result<RunResult>>) -> Result<Vec<RunResult>> {
+    let (made, failed): (Vec<_>, Vec<_>) = results.into_iter().partition(Result::is_ok);
+    let mut errors = failed.into_iter().filter_map(Result::err);
+    match errors.next() {
+        None => Ok(made.into_iter().flatten().collect()),
+        Some(first) => {
+            let others: Vec<String> = errors.map(|error| format!("{error:#}")).collect();
+            Err(if others.is_empty() {
+                first
+            } else {
+                first.context(others.join("; "))
+            })
+        }
+    }
+}
+
 /// Records, and keeps the recording beside the results made from it.
 fn recording(
     scenario: &Scenario,
     vehicle: &VehicleParameters,
     seed: u64,
     out: &Path,
+    interrupt: &Interrupt,
 ) -> Result<Dataset> {
-    let (dataset, summary) = record(scenario, vehicle, seed)?;
+    let (dataset, summary) = record(scenario, vehicle, seed, interrupt)?;
     record::write(&out.join("recording.csv"), &dataset)?;
     write_json(&out.join("recording.json"), &summary)?;
     Ok(dataset)

@@ -1,6 +1,6 @@
 //! From a recording and settings to a controller: the offline line of the data flow.
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use deepc_core::controller::{Controller, DeepcController, RecedingHorizonSettings};
 use deepc_core::data::Dataset;
 use deepc_core::hankel::{HankelMatrix, Horizons};
@@ -29,6 +29,12 @@ pub fn controller(
     let exciting = hankel
         .require_persistently_exciting(settings.order_bound)
         .context("the recording cannot be used")?;
+    if let Some((name, value)) = exciting.report().and_then(|r| r.constant_outputs.first()) {
+        bail!(
+            "the recording cannot be used: output `{name}` is constant at {value}, so nothing can \
+             be learnt about it; check its sensor and record again"
+        );
+    }
     let predictor = match settings.method {
         Method::Deepc => Predictor::full(&exciting),
         Method::RdDeepc => Predictor::exact(&exciting)?,

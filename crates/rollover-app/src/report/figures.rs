@@ -31,6 +31,13 @@ pub struct Figure {
 /// The road's edges as a picture needs them, in metres.
 pub type Polyline = Vec<(f64, f64)>;
 
+/// File names, without extension, of all figures.
+pub const FIGURE_NAMES: [&str; 4] = [LTR, SPEED, STEERING_WHEEL, COURSE];
+const LTR: &str = "ltr";
+const SPEED: &str = "speed";
+const STEERING_WHEEL: &str = "steering-wheel";
+const COURSE: &str = "course";
+
 const WIDE: (u32, u32) = (920, 400);
 /// LTR beyond its limits, with room for the legend above.
 const LTR_AXIS: (f64, f64) = (-1.5, 2.1);
@@ -52,7 +59,7 @@ fn ltr(runs: &[RunTrace<'_>]) -> Result<Figure> {
     let mut series = run_series(runs, |r| r.ltr);
     series.extend(limits(runs, &[-LTR_LIFT_OFF, LTR_LIFT_OFF]));
     Ok(Figure {
-        name: "ltr",
+        name: LTR,
         caption: "Load transfer ratio. At ±1 the inner wheels carry nothing. A cross marks a run that ended early.".into(),
         svg: time_chart(runs, "Load transfer ratio", "LTR", LTR_AXIS, &series)?,
     })
@@ -73,7 +80,7 @@ fn speed(runs: &[RunTrace<'_>]) -> Result<Figure> {
     }
     let range = padded(&series, 2.0);
     Ok(Figure {
-        name: "speed",
+        name: SPEED,
         caption: "Speed (thick) and the commanded target speed (thin).".into(),
         svg: time_chart(runs, "Speed", "km/h", range, &series)?,
     })
@@ -87,7 +94,7 @@ fn steering_wheel(runs: &[RunTrace<'_>]) -> Result<Figure> {
     }
     let range = padded(&series, 10.0);
     Ok(Figure {
-        name: "steering-wheel",
+        name: STEERING_WHEEL,
         caption: "Steering wheel: what was applied (thick) and what the driver asked for (thin)."
             .into(),
         svg: time_chart(runs, "Steering wheel", "deg", range, &series)?,
@@ -137,7 +144,7 @@ fn course(runs: &[RunTrace<'_>], road_edges: &[Polyline]) -> Result<Figure> {
         y,
     };
     Ok(Figure {
-        name: "course",
+        name: COURSE,
         caption: "The road's edges and where the vehicle went.".into(),
         svg: line_chart(size, &axes, &series)?,
     })

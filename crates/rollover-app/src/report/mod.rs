@@ -5,6 +5,6 @@ mod figures;
 mod page;
 mod table;
 
-pub use figures::{Figure, Polyline, RunTrace, draw_all};
+pub use figures::{FIGURE_NAMES, Figure, Polyline, RunTrace, draw_all};
 pub use page::{Page, PageRun, write_index};
 pub use table::summary_table;

@@ -44,6 +44,10 @@ pub(super) const TIME_HEADINGS: [&str; 3] = ["step µs median", "p99", "max"];
 
 pub(super) fn time_cells(run: &Summary) -> Vec<String> {
     let t = run.step_time_us;
+    if t.max == 0.0 {
+        // The driver alone decides nothing that could be timed.
+        return ["–"; 3].map(str::to_owned).to_vec();
+    }
     [t.median, t.p99, t.max]
         .map(|us| format!("{us:.0}"))
         .to_vec()

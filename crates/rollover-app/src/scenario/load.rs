@@ -135,12 +135,30 @@ struct Check<'a> {
 
 impl Check<'_> {
     fn scenario(&self, s: &Scenario) -> Result<(), ScenarioError> {
+        self.name("name", &s.name)?;
         self.within("sample_time_s", s.sample_time_s, 0.001, 0.1)?;
         self.within("duration_s", s.duration_s, s.sample_time_s, 3600.0)?;
         self.within("speed_reference_kmh", s.speed_reference_kmh, 10.0, 250.0)?;
         self.within("ground.friction", s.ground.friction, 0.01, 1.5)?;
-        self.range("bounds.steering_wheel_deg", s.bounds.steering_wheel_deg)?;
-        self.range("bounds.target_speed_kmh", s.bounds.target_speed_kmh)?;
+        let bounds = &s.bounds;
+        self.range("bounds.steering_wheel_deg", bounds.steering_wheel_deg, 0.0)?;
+        self.range(
+            "bounds.target_speed_kmh",
+            bounds.target_speed_kmh,
+            s.speed_reference_kmh,
+        )?;
+        self.within(
+            "bounds.target_speed_kmh[0]",
+            bounds.target_speed_kmh[0],
+            0.0,
+            540.0,
+        )?;
+        self.within(
+            "bounds.target_speed_kmh[1]",
+            bounds.target_speed_kmh[1],
+            0.0,
+            540.0,
+        )?;
         let recording = &s.recording;
         self.within(
             "recording.duration_s",
@@ -197,6 +215,7 @@ impl Check<'_> {
                 "another name: `driver` is the driver alone in every scenario",
             ));
         }
+        self.name("controllers", name)?;
         self.within(&field("ltr_limit"), c.ltr_limit, 0.05, 2.0)?;
         let counts = [
             ("past_steps", c.past_steps),
@@ -270,15 +289,24 @@ impl Check<'_> {
         Err(self.out_of_range(field, value.to_string(), &format!("in [{low}, {high}]")))
     }
 
-    fn range(&self, field: &str, [low, high]: [f64; 2]) -> Result<(), ScenarioError> {
-        if low < high && low.is_finite() && high.is_finite() {
+    /// Names become names of folders.
+    fn name(&self, field: &str, name: &str) -> Result<(), ScenarioError> {
+        let plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+        if !name.is_empty() && !name.starts_with('.') && name.chars().all(plain) {
             return Ok(());
         }
-        Err(self.out_of_range(
-            field,
-            format!("[{low}, {high}]"),
-            "[lowest, highest], both finite",
-        ))
+        let allowed = "made of letters, digits, `-`, `_` and `.`, not beginning with `.`";
+        Err(self.out_of_range(field, format!("`{name}`"), allowed))
+    }
+
+    /// A range around `held`.
+    fn range(&self, field: &str, [low, high]: [f64; 2], held: f64) -> Result<(), ScenarioError> {
+        let proper = low < high && low.is_finite() && high.is_finite();
+        if proper && (low..=high).contains(&held) {
+            return Ok(());
+        }
+        let allowed = format!("[lowest, highest], both finite, around {held}");
+        Err(self.out_of_range(field, format!("[{low}, {high}]"), &allowed))
     }
 
     fn out_of_range(&self, field: &str, value: String, allowed: &str) -> ScenarioError {

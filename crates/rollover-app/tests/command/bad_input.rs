@@ -232,3 +232,68 @@ fn a_failed_run_leaves_no_summary_behind() {
     let log = folder.path().join("log.csv");
     assert!(!Path::new(&log).exists(), "nothing ran, so there is no log");
 }
+
+#[test]
+fn a_dead_output_is_told() {
+    let message = fail_with_recording(|lines| {
+        let kill = |(index, line): (usize, &String)| {
+            if index == 0 {
+                line.clone()
+            } else {
+                replace_field(line, 3, "0.25")
+            }
+        };
+        lines.iter().enumerate().map(kill).collect()
+    });
+    assert_says(&message, &["`ltr`", "constant at 0.25", "sensor"]);
+}
+
+#[test]
+fn a_reference_outside_the_bounds_is_refused() {
+    let controlled = [
+        "run",
+        "sedan-s1",
+        "--controller",
+        "rd-deepc-1",
+        "--speed",
+        "60",
+    ];
+    let message = fail(folder().path(), &controlled);
+    assert_says(
+        &message,
+        &["60", "bounds.target_speed_kmh = [100, 120]", "rd-deepc-1"],
+    );
+    let message = fail_with_scenario(
+        "target_speed_kmh = [100.0, 120.0]",
+        "target_speed_kmh = [110.0, 120.0]",
+    );
+    assert_says(
+        &message,
+        &["bounds.target_speed_kmh", "[110, 120]", "around 105"],
+    );
+}
+
+#[test]
+fn a_name_that_would_leave_the_output_folder_is_refused() {
+    let message = fail_with_scenario("name = \"sedan-s1\"", "name = \"../elsewhere\"");
+    assert_says(&message, &["name", "`../elsewhere`", "letters"]);
+}
+
+#[test]
+fn a_recording_that_leaves_the_road_is_refused() {
+    let folder = folder();
+    let sleepy = SCENARIO.replace(
+        "preview_gain_deg_per_m = 24.0",
+        "preview_gain_deg_per_m = 8.0",
+    );
+    write(&folder.path().join("mine.toml"), &sleepy);
+    let message = fail(folder.path(), &["record", "mine.toml", "--out", "."]);
+    assert_says(
+        &message,
+        &["did not survive the recording", "left_road", "wider turns"],
+    );
+    assert!(
+        !folder.path().join("recording.csv").exists(),
+        "nothing is kept of it"
+    );
+}

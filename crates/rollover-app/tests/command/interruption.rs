@@ -11,6 +11,14 @@ use super::{assert_says, command, folder};
 /// Generous: a loaded machine may take long to get the run going.
 const PATIENCE: Duration = Duration::from_mins(2);
 
+/// Sends Ctrl-C.
+fn interrupt(process: u32) {
+    let sent = Command::new("kill")
+        .args(["-INT", &process.to_string()])
+        .status();
+    assert!(sent.expect("kill starts").success(), "the signal is sent");
+}
+
 #[test]
 fn what_was_logged_before_ctrl_c_stays_readable() {
     let folder = folder();
@@ -34,12 +42,7 @@ fn what_was_logged_before_ctrl_c_stays_readable() {
         assert!(started.elapsed() < PATIENCE, "the run does not begin");
         std::thread::sleep(Duration::from_millis(2));
     }
-    let id = running.id().to_string();
-    let sent = Command::new("kill")
-        .args(["-INT", &id])
-        .status()
-        .expect("kill starts");
-    assert!(sent.success(), "the signal is sent");
+    interrupt(running.id());
     let output = running.wait_with_output().expect("the command ends");
 
     assert_eq!(
@@ -62,4 +65,38 @@ fn what_was_logged_before_ctrl_c_stays_readable() {
         !folder.path().join("stopped/summary.json").exists(),
         "no summary of half a run"
     );
+}
+
+#[test]
+fn a_campaign_that_is_stopped_leaves_no_page_and_no_empty_log() {
+    let folder = folder();
+    let out = folder.path().join("out");
+    super::succeed(
+        folder.path(),
+        &["paper", "--jobs", "1", "--out", "out", "--json"],
+    );
+    let before = std::fs::read(out.join("rd-deepc-1-paper/log.csv")).expect("the last run's log");
+    std::fs::remove_file(out.join("driver/log.csv")).expect("the first run's log is there");
+    let running = command(
+        folder.path(),
+        &["paper", "--jobs", "1", "--out", "out", "--seed", "11"],
+    )
+    .stdout(Stdio::piped())
+    .stderr(Stdio::piped())
+    .spawn()
+    .expect("the command starts");
+    let started = Instant::now();
+    while std::fs::metadata(out.join("driver/log.csv")).map_or(0, |m| m.len()) == 0 {
+        assert!(started.elapsed() < PATIENCE, "the campaign does not begin");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    interrupt(running.id());
+    let output = running.wait_with_output().expect("the command ends");
+    assert_eq!(output.status.code(), Some(130));
+    assert!(
+        !out.join("index.html").exists(),
+        "no page about another seed's runs"
+    );
+    let after = std::fs::read(out.join("rd-deepc-1-paper/log.csv")).expect("the last run's log");
+    assert_eq!(before, after, "a run that did not begin keeps what it had");
 }
