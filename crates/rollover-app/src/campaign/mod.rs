@@ -82,6 +82,7 @@ pub fn single(args: &RunArgs, interrupt: &Interrupt) -> Result<()> {
     let settings = scenario.controller(&args.controller)?;
     let vehicle = load_vehicle(args.vehicle.as_ref().unwrap_or(&scenario.vehicle))?;
     let speed_reference_kmh = args.speed.unwrap_or(scenario.speed_reference_kmh);
+    scenario.check_road_at(speed_reference_kmh)?;
     let [lowest, highest] = scenario.bounds.target_speed_kmh;
     ensure!(
         settings.is_none() || (lowest..=highest).contains(&speed_reference_kmh),

@@ -104,6 +104,18 @@ pub fn load(name_or_path: &str) -> Result<Scenario, ScenarioError> {
     )
 }
 
+impl Scenario {
+    /// Checks that the road is long enough for a run at `speed_kmh`.
+    ///
+    /// # Errors
+    /// With the lengths, when it is not.
+    pub fn check_road_at(&self, speed_kmh: f64) -> Result<(), ScenarioError> {
+        let origin = format!("scenario {}", self.name);
+        let course = Course::new(&self.course);
+        Check { origin: &origin }.course("course", course, self.duration_s, speed_kmh)
+    }
+}
+
 fn unknown(name: &str) -> ScenarioError {
     let names = embedded_names();
     let closest = names

@@ -209,6 +209,10 @@ fn a_wrong_scenario_is_told_with_line_or_field() {
 fn a_speed_out_of_range_is_refused() {
     let message = fail(folder().path(), &["run", "sedan-s1", "--speed", "fast"]);
     assert_says(&message, &["fast", "km/h"]);
+    let message = fail(folder().path(), &["run", "sedan-s1", "--speed", "-5"]);
+    assert_says(&message, &["-5 km/h", "[10, 250]"]);
+    let message = fail(folder().path(), &["run", "sedan-s1", "--speed", "150"]);
+    assert_says(&message, &["150 km/h", "m long", "lengthen"]);
 }
 
 #[test]
