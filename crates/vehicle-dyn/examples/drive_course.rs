@@ -1,37 +1,18 @@
-//! Drives the sedan with its driver alone over a three-turn course, and prints the largest |LTR| of
-//! each turn and the outcome: `cargo run --release -p vehicle-dyn --example drive_course -- 105`.
+//! Drives the sedan with its driver alone over the course of the shipped scenario, and prints
+//! the largest |LTR| of each turn and the outcome: `cargo run --release -p vehicle-dyn --example drive_course -- 105`.
 
 use std::error::Error;
 
-use vehicle_dyn::driver::{Driver, DriverParameters};
+use toml::Table;
+use vehicle_dyn::driver::Driver;
 use vehicle_dyn::metrics::OutcomeMonitor;
-use vehicle_dyn::road::{Course, CourseDescription, Segment};
+use vehicle_dyn::road::{Course, Segment};
 use vehicle_dyn::simulation::{Command, InitialPose, Simulation};
 use vehicle_dyn::terrain::Terrain;
 use vehicle_dyn::units::KMH;
 use vehicle_dyn::vehicles;
 
-const COURSE: &str = r#"
-width_m = 7.0
-segments = [
-    { straight_m = 145.0 },
-    { turn = "left", radius_m = 144.0, arc_m = 60.0, clothoid_m = 40.0 },
-    { straight_m = 60.0 },
-    { turn = "right", radius_m = 133.0, arc_m = 55.0, clothoid_m = 40.0 },
-    { straight_m = 70.0 },
-    { turn = "left", radius_m = 108.0, arc_m = 75.0, clothoid_m = 30.0 },
-    { straight_m = 420.0 },
-]
-"#;
-const DRIVER: DriverParameters = DriverParameters {
-    preview_time_s: 0.8,
-    preview_gain_deg_per_m: 24.0,
-    error_rate_gain_deg_s_per_m: 3.0,
-    integral_gain_deg_per_m_s: 0.0,
-    lag_s: 0.08,
-    handwheel_limit_deg: 200.0,
-    handwheel_rate_limit_deg_per_s: 500.0,
-};
+const SCENARIO: &str = include_str!("../../../scenarios/sedan-s1.toml");
 const DURATION_S: f64 = 35.0;
 const TICK_S: f64 = 0.01;
 
@@ -41,7 +22,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         .as_deref()
         .unwrap_or("105")
         .parse()?;
-    let course = Course::new(&toml::from_str::<CourseDescription>(COURSE)?)?;
+    let scenario: Table = SCENARIO.parse()?;
+    let course = Course::new(&scenario["course"].clone().try_into()?)?;
     let pose = InitialPose {
         x_m: 0.0,
         y_m: 0.0,
@@ -49,7 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         speed_m_s: speed_kmh * KMH,
     };
     let mut simulation = Simulation::new(&vehicles::embedded("sedan")?, Terrain::flat(0.85), pose)?;
-    let mut driver = Driver::new(&DRIVER)?;
+    let mut driver = Driver::new(&scenario["driver"].clone().try_into()?)?;
     let mut monitor = OutcomeMonitor::new(course.width_m());
 
     // Stations where each turn begins; what happens up to the next turn is counted to it.

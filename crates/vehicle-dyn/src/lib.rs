@@ -35,11 +35,18 @@
 //!
 //! # What is checked, and what is not
 //! Tests hold statics, symmetry, energy and momentum, the tyre law, the tilt table and the
-//! convergence of the integrator. Step steers up to 0.7 g were compared with an independent
-//! multi-body model (`CommonRoad`'s, of a BMW 320i): yaw gain and LTR per g agreed within 5 %, the
-//! roll gradient within 7 %; that comparison is not a test yet.
-//! Nothing here validates the motion after wheels have lifted: no reference for
-//! it was at hand. The car's body never touches the ground; a run should end at 60° of roll.
+//! convergence of the integrator: the equations are solved right. No test compares the handling
+//! with another vehicle model or with measurements yet, so nothing here shows that they are the
+//! right equations for a given car.
+//!
+//! Nothing validates the motion after wheels have lifted: no reference for it was at hand. A wheel
+//! without load loses its slip within about 10 ms ([`wheels`]), and touches down with none. The
+//! car's body never touches the ground; a run should end at 60° of roll.
+//!
+//! Known simplifications: rolling resistance brakes the wheel's spin, but its moment on the body
+//! (load times coefficient times radius, about 40 N m on the sedan) is left out of the pitch. The
+//! jacking forces of a steered wheel miss a term in the energy balance that is proportional to the
+//! sine of the steering angle ([`suspension::AxleSuspension::forces_n`]).
 
 pub mod chassis;
 pub mod driver;

@@ -38,7 +38,11 @@ impl AxleSuspension {
     /// The links carry a lateral force `F_y` towards the roll centre, so they lift the outer side
     /// and pull down the inner side by `F_y · h_rc/(T/2)`: a pair of forces between body and wheel.
     /// The contact point moves sideways with the travel by the same slope
-    /// ([`crate::wheels::WheelMotion::scrub_per_travel`]), so that the pair does no work of its own.
+    /// ([`crate::wheels::WheelMotion::scrub_per_travel`]), so that the pair of a wheel that points
+    /// straight ahead does no work of its own. A wheel steered by `δ` also scrubs along its own
+    /// direction, which the longitudinal slip leaves out: there the pair takes or gives
+    /// `F_x · sin δ · slope · rate`, with the wheel's longitudinal force `F_x`. On the sedan's
+    /// courses this moves the load transfer ratio by 2e-6 before wheels lift.
     #[must_use]
     pub fn forces_n(&self, travel_m: Pair, rate_m_s: Pair, lateral_n: Pair) -> Pair {
         let anti_roll = self.anti_roll_n_per_m * (travel_m[1] - travel_m[0]);

@@ -12,6 +12,10 @@ use crate::tyre::{MagicFormula, RadialSpring};
 const LEAST_COS_CAMBER: f64 = 0.1;
 /// 1/largest relaxed slip: sliding straight sideways counts as a slip of 10, not as an infinite one.
 const SLIP_PER_LARGEST: f64 = 0.1;
+/// Rate at which the slip of a wheel off the ground fades, 1/s. Relaxed slip is the bending of the
+/// tyre's carcass by the force in its contact patch. Without a patch it springs back, as fast as a
+/// carcass swings; a time constant of 10 ms is an estimate.
+const UNLOADED_RELEASE_PER_S: f64 = 100.0;
 /// 1/speed of the tread over which rolling resistance fades to zero at standstill, s/m.
 const ROLLING_FADE_S_PER_M: f64 = 10.0;
 
@@ -75,7 +79,7 @@ pub struct Contact {
     pub tangential_n: Vector3<f64>,
     /// From wheel centre to contact point, m.
     pub arm_m: Vector3<f64>,
-    /// Rate of the relaxed slip, 1/s.
+    /// Rate of the relaxed slip, 1/s. A wheel without load loses its slip.
     pub slip_rate: [f64; 2],
     /// Moment of the ground about the spin axis, N m.
     pub spin_moment_nm: f64,
@@ -110,15 +114,20 @@ impl Wheel {
         let rolling_radius = self.rolling_radius_m(deflection);
         let tread_speed = motion.spin_rad_s * rolling_radius;
         let speed = motion.velocity_m_s.dot(&forward);
+        // Only across the wheel: the part along a steered wheel, `scrub * forward.y`, is left out.
         let scrub = motion.scrub_per_travel * motion.travel_rate_m_s;
         let lateral_speed = contact_velocity.dot(&left) + scrub * left.y;
         let slip_speed = [tread_speed - speed, -lateral_speed];
         let slide = (slip_speed[0] * slip_speed[0] + slip_speed[1] * slip_speed[1]).sqrt();
         let transport = speed.abs().max(slide * SLIP_PER_LARGEST);
-        let slip_rate = [
-            (slip_speed[0] - transport * motion.slip[0]) * self.inverse_relaxation[0],
-            (slip_speed[1] - transport * motion.slip[1]) * self.inverse_relaxation[1],
-        ];
+        let slip_rate = if load > 0.0 {
+            [
+                (slip_speed[0] - transport * motion.slip[0]) * self.inverse_relaxation[0],
+                (slip_speed[1] - transport * motion.slip[1]) * self.inverse_relaxation[1],
+            ]
+        } else {
+            motion.slip.map(|slip| -UNLOADED_RELEASE_PER_S * slip)
+        };
 
         let slip = [
             motion.slip[0],

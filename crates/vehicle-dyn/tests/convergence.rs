@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{drive, pose, sedan, step_steer, three_turns};
+use common::{drive, five_turns, pose, sedan, step_steer, three_turns};
 use vehicle_dyn::road::Course;
 use vehicle_dyn::simulation::{DEFAULT_SUBSTEP_S, Observation, Simulation};
 use vehicle_dyn::terrain::Terrain;
@@ -39,18 +39,24 @@ fn halving_the_step_changes_the_load_transfer_of_step_steers_by_less_than_1e_3()
 }
 
 #[test]
-fn halving_the_step_changes_the_load_transfer_on_the_course_by_less_than_1e_3() {
-    let course = Course::new(&three_turns()).expect("valid course");
-    for speed_kmh in [100.0, 105.0] {
-        let runs = [1.0, 0.5].map(|factor| {
-            drive(
-                with_substep(speed_kmh, factor * DEFAULT_SUBSTEP_S),
-                &course,
-                speed_kmh,
-                35.0,
-            )
-        });
-        let difference = largest_difference(&runs[0], &runs[1]);
-        assert!(difference < 1e-3, "{difference} at {speed_kmh} km/h");
+fn halving_the_step_changes_the_load_transfer_on_the_shipped_courses_by_less_than_1e_3() {
+    for (name, description) in [("course", three_turns()), ("recording", five_turns())] {
+        let course = Course::new(&description).expect("valid course");
+        for speed_kmh in [100.0, 105.0] {
+            let runs = [1.0, 0.5].map(|factor| {
+                drive(
+                    with_substep(speed_kmh, factor * DEFAULT_SUBSTEP_S),
+                    &course,
+                    speed_kmh,
+                    35.0,
+                )
+            });
+            let difference = largest_difference(&runs[0], &runs[1]);
+            println!("{name} at {speed_kmh} km/h: {difference:.1e}");
+            assert!(
+                difference < 1e-3,
+                "{difference} on the {name} at {speed_kmh} km/h"
+            );
+        }
     }
 }

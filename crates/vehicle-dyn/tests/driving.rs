@@ -3,7 +3,8 @@
 mod common;
 
 use common::{TICK_S, on_flat, sedan, step_steer};
-use vehicle_dyn::simulation::{Command, Simulation};
+use nalgebra::Vector3;
+use vehicle_dyn::simulation::{Command, InitialPose, Simulation};
 use vehicle_dyn::terrain::{Ground, Terrain};
 use vehicle_dyn::units::DEGREE;
 
@@ -149,4 +150,45 @@ fn a_vehicle_on_a_banked_plane_starts_parallel_to_it_and_leans_on_its_low_side()
         (loads / expected - 1.0).abs() < 1e-3,
         "{loads} N instead of {expected} N"
     );
+}
+
+#[test]
+fn a_vehicle_turned_on_a_slope_stands_upright_on_it() {
+    let plane = Ground {
+        height_m: 3.0,
+        gradient_x: 0.12,
+        gradient_y: -0.07,
+        friction: 0.85,
+    };
+    let level = on_flat(&sedan(), 0.85, 60.0).observation();
+    for yaw_rad in [1.1_f64, -2.0] {
+        let pose = InitialPose {
+            x_m: 20.0,
+            y_m: -10.0,
+            yaw_rad,
+            ..common::pose(60.0)
+        };
+        let simulation = Simulation::new(&sedan(), Terrain::Plane(plane), pose).expect("valid");
+        let rotation = simulation.state().rotation();
+        // Its pitch on the level (drive and drag) stays; its own up axis is else the plane's normal.
+        let up = rotation * Vector3::z();
+        let off = up.dot(&plane.normal()).acos();
+        assert!((off - level.pitch_rad.abs()).abs() < 1e-6, "{off} rad off");
+        // It heads where it was asked to, up to what the slope foreshortens.
+        let ahead = rotation * Vector3::x();
+        assert!((ahead.y.atan2(ahead.x) - yaw_rad).abs() < 0.01, "{ahead}");
+        assert!((simulation.state().velocity_m_s.dot(&plane.normal())).abs() < 1e-6);
+        // Laid onto the plane, each wheel is pressed in as on the level.
+        for (found, expected) in simulation
+            .observation()
+            .wheel_loads_n
+            .into_iter()
+            .zip(level.wheel_loads_n)
+        {
+            assert!(
+                (found - expected).abs() < 0.1,
+                "{found} instead of {expected} N"
+            );
+        }
+    }
 }

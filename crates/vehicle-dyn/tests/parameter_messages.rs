@@ -278,6 +278,61 @@ fn values_that_contradict_each_other_are_refused() {
 }
 
 #[test]
+fn a_wheel_too_light_for_the_integration_step_is_refused_with_its_rate() {
+    let file = with_line(
+        "unsprung_mass_rear_each_kg",
+        "unsprung_mass_rear_each_kg = 0.5",
+    );
+    let message = message(&file);
+    assert!(
+        message.starts_with(
+            "mass.unsprung_mass_rear_each_kg = 0.5 with tyre.vertical_stiffness_rear_n_per_m = \
+             190000, suspension.spring_rate_rear_n_per_m = 22000"
+        ),
+        "{message}"
+    );
+    assert!(
+        message.contains("in vehicles/x.toml: the wheel would hop at a rate of")
+            && message.contains("step of 1 ms follows at most 1000 1/s"),
+        "{message}"
+    );
+}
+
+#[test]
+fn a_vehicle_just_within_the_limit_of_the_integration_step_runs() {
+    // The lightest wheels that pass, found by halving the interval.
+    let with_mass = |mass_kg: f64| {
+        let mut vehicle = sedan();
+        vehicle.mass.unsprung_mass_front_each_kg = mass_kg;
+        vehicle.mass.unsprung_mass_rear_each_kg = mass_kg;
+        vehicle
+    };
+    let (mut refused, mut allowed) = (0.1, 31.9);
+    for _ in 0..30 {
+        let middle = 0.5 * (refused + allowed);
+        if with_mass(middle).check().is_ok() {
+            allowed = middle;
+        } else {
+            refused = middle;
+        }
+    }
+    assert!((1.0..10.0).contains(&allowed), "{allowed} kg");
+    let seen = common::step_steer(common::on_flat(&with_mass(allowed), 0.85, 80.0), 40.0, 80.0);
+    let last = seen.last().expect("not empty");
+    assert!(last.ltr > 0.3 && last.ltr < 0.9, "{}", last.ltr);
+}
+
+#[test]
+fn an_empty_name_is_refused() {
+    for name in ["", "  "] {
+        assert_eq!(
+            message(&with_line("name", &format!("name = \"{name}\""))),
+            "name is empty in vehicles/x.toml: give a short one, as it stands in logs and tables"
+        );
+    }
+}
+
+#[test]
 fn a_file_that_is_not_there_says_what_else_there_is() {
     let error = vehicles::find("no/such/file.toml").expect_err("absent");
     assert!(matches!(error, ParameterError::Unreadable { .. }));

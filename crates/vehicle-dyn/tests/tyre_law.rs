@@ -5,7 +5,7 @@ mod common;
 use common::sedan;
 use proptest::prelude::*;
 use vehicle_dyn::parameters::TyreParameters;
-use vehicle_dyn::tyre::{MagicFormula, RadialSpring, shape};
+use vehicle_dyn::tyre::{MagicFormula, RadialSpring};
 
 const WEIGHT_N: f64 = 12_393.0;
 
@@ -15,6 +15,37 @@ fn tyre() -> TyreParameters {
 
 fn formula(tyre: &TyreParameters) -> MagicFormula {
     MagicFormula::new(tyre, tyre.stiffness_factor_b1_front, WEIGHT_N)
+}
+
+/// `P(s_c, C1, E1)` of the paper's eq. (magic), written out from the paper.
+fn papers_shape(s_c: f64, c1: f64, e1: f64) -> f64 {
+    (c1 * (s_c / c1 * (1.0 - e1) + e1 * (s_c / c1).atan()).atan()).sin()
+}
+
+#[test]
+fn the_shape_has_the_values_of_the_papers_formula_worked_by_hand() {
+    // C1 = 1.4 and s_c = 1.4, so s_c/C1 = 1 and its arc tangent is π/4. With E1 = 0.5 the argument
+    // is 0.5 + 0.392699 = 0.892699, with E1 = −2 it is 3 − 1.570796 = 1.429204, with E1 = 0.8
+    // (beyond the table) 0.2 + 0.628319 = 0.828319.
+    for (e1, argument) in [
+        (0.0, 1.0_f64),
+        (0.5, 0.892_699_081_698_724),
+        (-2.0, 1.429_203_673_205_103),
+        (0.8, 0.828_318_530_717_959),
+    ] {
+        let tyre = TyreParameters {
+            shape_factor_c1: 1.4,
+            curvature_factor_e1: e1,
+            ..tyre()
+        };
+        let formula = formula(&tyre);
+        let load = 3000.0;
+        let peak = formula.peak_force_n(load, 0.85);
+        let slip = 1.4 * peak / formula.stiffness_n(load, 0.85);
+        let found = formula.force_n(load, 0.85, [0.0, slip])[1] / peak;
+        let expected = (1.4 * argument.atan()).sin();
+        assert!((found - expected).abs() < 1e-9, "E1 = {e1}: {found}");
+    }
 }
 
 #[test]
@@ -130,7 +161,7 @@ proptest! {
         let peak = formula.peak_force_n(load, 0.85);
         let reduced = formula.stiffness_n(load, 0.85) * slip / peak;
         // The simulation interpolates a table of the shape.
-        let exact = peak * shape(reduced, c1, e1)[0];
+        let exact = peak * papers_shape(reduced, c1, e1);
         let found = formula.force_n(load, 0.85, [0.0, slip])[1];
         prop_assert!((found - exact).abs() <= 1e-9 * peak, "{found} N instead of {exact} N");
     }

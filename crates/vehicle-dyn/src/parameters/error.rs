@@ -62,6 +62,12 @@ pub enum ParameterError {
         /// The offending line.
         excerpt: String,
     },
+    /// The vehicle has no name.
+    #[error("name is empty in {origin}: give a short one, as it stands in logs and tables")]
+    NoName {
+        /// Name of the file.
+        origin: String,
+    },
     /// A value outside its allowed range.
     #[error("{field} = {value} in {origin}: must be in {range}")]
     OutOfRange {

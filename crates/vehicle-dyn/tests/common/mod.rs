@@ -27,17 +27,22 @@ pub fn on_flat(vehicle: &VehicleParameters, friction: f64, speed_kmh: f64) -> Si
     Simulation::new(vehicle, Terrain::flat(friction), pose(speed_kmh)).expect("valid set-up")
 }
 
-/// The driver calibrated for the sedan.
+/// A part of the shipped scenario, so that what is tested is what is shipped.
+fn shipped<T: serde::de::DeserializeOwned>(keys: &[&str]) -> T {
+    let scenario: toml::Table = include_str!("../../../../scenarios/sedan-s1.toml")
+        .parse()
+        .expect("the shipped scenario is TOML");
+    let value = keys
+        .iter()
+        .fold(toml::Value::Table(scenario), |table, key| {
+            table[*key].clone()
+        });
+    value.try_into().expect("a valid part of the scenario")
+}
+
+/// The driver of the shipped scenario, calibrated for the sedan.
 pub fn sedan_driver() -> DriverParameters {
-    DriverParameters {
-        preview_time_s: 0.8,
-        preview_gain_deg_per_m: 24.0,
-        error_rate_gain_deg_s_per_m: 3.0,
-        integral_gain_deg_per_m_s: 0.0,
-        lag_s: 0.08,
-        handwheel_limit_deg: 200.0,
-        handwheel_rate_limit_deg_per_s: 500.0,
-    }
+    shipped(&["driver"])
 }
 
 pub fn turn(turn: TurnDirection, radius_m: f64, arc_m: f64, clothoid_m: f64) -> Segment {
@@ -53,21 +58,14 @@ pub fn straight(straight_m: f64) -> Segment {
     Segment::Straight { straight_m }
 }
 
-/// The three-turn course: left, right, left at 0.60, 0.65 and 0.80 g for 105 km/h.
+/// The course of the shipped scenario: left, right, left.
 pub fn three_turns() -> CourseDescription {
-    use TurnDirection::{Left, Right};
-    CourseDescription {
-        width_m: 7.0,
-        segments: vec![
-            straight(145.0),
-            turn(Left, 144.0, 60.0, 40.0),
-            straight(60.0),
-            turn(Right, 133.0, 55.0, 40.0),
-            straight(70.0),
-            turn(Left, 108.0, 75.0, 30.0),
-            straight(420.0),
-        ],
-    }
+    shipped(&["course"])
+}
+
+/// The recording course of the shipped scenario: five turns.
+pub fn five_turns() -> CourseDescription {
+    shipped(&["recording", "course"])
 }
 
 /// Drives a course with the driver alone and returns what was observed, tick by tick.

@@ -2,6 +2,7 @@
 
 mod contradictions;
 mod ranges;
+mod stiffness;
 
 use super::{ParameterError, VehicleParameters};
 
@@ -9,14 +10,21 @@ impl VehicleParameters {
     /// Checks every value against its range, and that the values fit together.
     ///
     /// # Errors
-    /// [`ParameterError::OutOfRange`] or [`ParameterError::Contradiction`], naming the vehicle.
+    /// [`ParameterError::NoName`], [`ParameterError::OutOfRange`] or
+    /// [`ParameterError::Contradiction`], naming the vehicle.
     pub fn check(&self) -> Result<(), ParameterError> {
         self.check_as(&format!("vehicle `{}`", self.name))
     }
 
     /// As [`VehicleParameters::check`], with messages that name `origin`.
     pub(super) fn check_as(&self, origin: &str) -> Result<(), ParameterError> {
+        if self.name.trim().is_empty() {
+            return Err(ParameterError::NoName {
+                origin: origin.to_owned(),
+            });
+        }
         ranges::check(self, origin)?;
-        contradictions::check(self, origin)
+        contradictions::check(self, origin)?;
+        stiffness::check(self, origin)
     }
 }
