@@ -217,6 +217,7 @@ fn a_past_no_trajectory_explains_is_infeasible_without_slack_in_both_forms() {
     );
     assert_eq!(condensed.status, QpStatus::Infeasible);
     assert!(condensed.past_inconsistency > 1e-3);
+    assert_eq!(condensed.iterations, 0, "no solver needs to be asked");
     assert_eq!(sparse.status, QpStatus::Infeasible);
 }
 
@@ -372,6 +373,41 @@ fn several_records_without_noise_control_like_one() {
         let a = situation.condensed(&one, &settings);
         let b = situation.condensed(&several, &settings);
         check_same(&format!("records, {seed}"), &a, &b, 1e-5, 1e-5);
+    }
+}
+
+#[test]
+fn multiplying_every_weight_by_a_constant_changes_no_plan() {
+    let predictor = predictor(0.05, 150);
+    let situation = Situation::new(&system(), 0.05, 2);
+    let scaled = |c: f64| {
+        let mut scaled = settings(Slack::Penalty(1e3 * c), Slack::Penalty(1e4 * c));
+        scaled.regularisation.lambda_g *= c;
+        scaled.input_weights.iter_mut().for_each(|w| *w *= c);
+        scaled.output_weights.iter_mut().for_each(|w| *w *= c);
+        scaled.output_bounds = vec![
+            OutputBounds::soft(-1.0, 1.0, 3.0 * c, 2.0 * c),
+            OutputBounds::none(),
+            OutputBounds::soft(-2.0, 1.5, 0.0, 5.0 * c),
+        ];
+        scaled
+    };
+    let expected = situation.condensed(&predictor, &scaled(1.0));
+    for c in [1e-14, 1e-10, 1e-6, 1e6, 1e10] {
+        let settings = scaled(c);
+        let mut active = situation.condensed(&predictor, &settings);
+        active.objective /= c;
+        check_same(&format!("{c:e}, active"), &active, &expected, 1e-9, 1e-7);
+        let mut sparse = situation.sparse(&predictor, &settings);
+        sparse.objective /= c;
+        check_same(&format!("{c:e}, sparse"), &sparse, &expected, 1e-7, 1e-5);
+        let mut program = CondensedProgram::new(&predictor, &settings).unwrap();
+        let mut direct = ClarabelDirect::new(program.qp(), ClarabelSettings::default()).unwrap();
+        let budget = SolveBudget::generous();
+        let plan = program.solve(&situation.moment(), &mut direct, &budget);
+        let mut direct = plan.unwrap().clone();
+        direct.objective /= c;
+        check_same(&format!("{c:e}, direct"), &direct, &expected, 1e-7, 1e-5);
     }
 }
 

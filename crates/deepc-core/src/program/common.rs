@@ -185,6 +185,16 @@ impl Ending {
         }
     }
 
+    /// No solver was asked: hard slack cannot explain the past.
+    pub fn refused() -> Self {
+        Self {
+            origin: PlanOrigin::Solver,
+            status: QpStatus::Infeasible,
+            iterations: 0,
+            residual: f64::NAN,
+        }
+    }
+
     pub fn of(solution: &QpSolution) -> Self {
         Self {
             origin: PlanOrigin::Solver,

@@ -186,6 +186,14 @@ impl DeepcProgram for CondensedProgram {
         true
     }
 
+    fn refuse_past(&mut self) -> bool {
+        let refused = !self.past_is_consistent();
+        if refused {
+            self.common.reject(Ending::refused());
+        }
+        refused
+    }
+
     fn accept(&mut self, solution: &QpSolution) {
         let mut ending = Ending::of(solution);
         if !self.past_is_consistent() {
@@ -209,7 +217,7 @@ impl DeepcProgram for CondensedProgram {
         if !self.common.plan.is_usable() {
             return None;
         }
-        let (g, slack) = self.factor.recover(&self.a, &self.z, self.common.lambda_g);
+        let (g, slack) = self.factor.recover(&self.a, &self.z);
         Some(recovered(&self.common, &self.future, g, &slack))
     }
 }

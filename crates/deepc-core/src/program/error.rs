@@ -87,13 +87,50 @@ pub enum ProgramError {
         /// Columns expected.
         expected_columns: usize,
     },
-    /// A factorisation broke down.
+    /// A factorisation left the range of the numbers.
     #[error(
-        "{what} broke down; the data or weights span too many orders of magnitude: bring channels and weights to similar sizes"
+        "{what} has no finite entry ({row}, {column}); the data or weights span too many orders \
+         of magnitude: bring channels and weights to similar sizes"
     )]
     Factorisation {
         /// Which factorisation.
         what: &'static str,
+        /// Row of the first bad entry of its triangular factor.
+        row: usize,
+        /// Its column.
+        column: usize,
+    },
+    /// The past without slack could not be taken apart.
+    #[error(
+        "the singular value decomposition of the {size} past entries whose slack is hard does not \
+         converge (pivots {smallest:e} to {largest:e}); bring the channels to similar sizes, or \
+         give both slacks a penalty"
+    )]
+    PastDecomposition {
+        /// Entries of the past whose slack is hard.
+        size: usize,
+        /// Smallest pivot of their triangular factor.
+        smallest: f64,
+        /// Its largest.
+        largest: f64,
+    },
+    /// A slack penalty is beyond what double precision can tell from hard slack.
+    #[error(
+        "slack penalty {lambda:e} is lost in rounding: entry {row} of the past keeps a pivot of \
+         {pivot:e} in a column of size {column:e}, and {tolerance:e} of it is needed; lower the \
+         penalty, raise `lambda_g`, or make this slack `hard`"
+    )]
+    SlackLost {
+        /// Row of `col(u_ini, y_ini)`, from 0.
+        row: usize,
+        /// `λ_u` or `λ_y`.
+        lambda: f64,
+        /// Pivot left to the entry.
+        pivot: f64,
+        /// Size of its column, of which the pivot must be a fraction.
+        column: f64,
+        /// That fraction.
+        tolerance: f64,
     },
     /// The quadratic program or its solver refused.
     #[error(transparent)]

@@ -21,6 +21,7 @@
 mod bounds;
 mod common;
 mod condensed;
+mod damping;
 mod error;
 mod past_factor;
 mod plan;
@@ -77,6 +78,12 @@ pub trait DeepcProgram: Send {
     /// Takes the unconstrained optimum as the plan if it is known and meets every bound.
     fn plan_unconstrained(&mut self) -> bool;
 
+    /// Ends the step as infeasible if it is known, before any solver is asked, that hard slack
+    /// cannot explain the past; whether it did.
+    fn refuse_past(&mut self) -> bool {
+        false
+    }
+
     /// Takes a solver's answer as the plan.
     fn accept(&mut self, solution: &QpSolution);
 
@@ -99,7 +106,7 @@ pub trait DeepcProgram: Send {
         budget: &SolveBudget,
     ) -> Result<&Plan, ProgramError> {
         self.set_moment(moment)?;
-        if !self.plan_unconstrained() {
+        if !self.refuse_past() && !self.plan_unconstrained() {
             solver.update(self.vectors())?;
             self.accept(solver.solve(budget));
         }

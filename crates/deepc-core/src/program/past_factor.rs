@@ -2,19 +2,27 @@
 //!
 //! Weigh g and the slacks to one vector `ζ = (√λ_g·g, −√λ_u·σ_u, −√λ_y·σ_y)`. Then
 //! `w = col(u_ini, y_ini, u, y) = Mᵀζ` with `M = [H̄ᵀ/√λ_g; diag(1/√λ_u, 1/√λ_y), 0]`, and the cost
-//! of g and σ is ‖ζ‖². With the QR decomposition M = Θ [R11 R12; 0 R22] the cheapest ζ for a
-//! given w is Θ(a, z) where
+//! of g and σ is ‖ζ‖². Order the past into the entries whose slack is hard (h) and those that
+//! have slack (s). With the QR decomposition
 //!
 //! ```text
-//! R11ᵀ a = w_ini        f0 = R12ᵀ a        f = f0 + F z, F = R22ᵀ        cost ‖a‖² + ‖z‖²
+//!        h    s    f                 R11 = [R_hh R_hs; 0 R_ss]
+//! M = Θ [R_hh R_hs R_hf]             R11ᵀ a = w_ini      f0 = R12ᵀ a
+//!       [     R_ss R_sf]             f = f0 + F z        F = R22ᵀ
+//!       [          R_ff]             cost ‖a‖² + ‖z‖²
 //! ```
 //!
-//! so that z, (m+p)N numbers, is all that is left to choose. `MᵀM` is never formed: its condition
-//! number is the square of M's and reaches 1e24 for data without noise. F may be singular.
+//! the cheapest ζ for a given w is Θ(a, z), so that z, (m+p)N numbers, is all that is left to
+//! choose. `MᵀM` is never formed: its condition number is the square of M's and reaches 1e24 for
+//! data without noise. F may be singular.
 //!
-//! If slack is hard and the data do not span every past (data without noise, more past samples
-//! than the plant's lag needs), R11 is singular. Its singular value decomposition then splits
-//! the past into the part that determines a and the part that must vanish.
+//! Θ is found in steps so that what counts as spanned is decided on the data alone, whatever the
+//! weights: first `H̄ᵀ = Θ_d R_d`, then the slack rows join (module `damping`). `R_hh` holds data
+//! and nothing else. If the data do not span every past of the hard entries (data without noise,
+//! more past samples than the plant's lag needs) it is singular. Then
+//! `R_hh = [U₁ U₂] diag(S, 0) [V₁ V₂]ᵀ`: the past must have `V₂ᵀw_h = 0` and determines
+//! α = `S⁻¹V₁ᵀw_h`, which takes the place of `a_h`; the rows `U₂ᵀ[R_hs R_hf]` are left for the slack
+//! and the future, and a second QR decomposition takes them in.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::householder::{
@@ -24,49 +32,61 @@ use faer::linalg::householder::{
 use faer::linalg::solvers::Qr;
 use faer::{Conj, Mat, MatRef, Par};
 
+use super::damping::Damping;
 use super::error::ProgramError;
 use crate::linalg;
 use crate::predictor::Predictor;
 
-/// Pasts that the data reach with less than this fraction of their strongest direction count as
-/// not spanned (channels scaled). Rounding leaves about 1e-14.
+/// Pasts that the data reach with less than this fraction of their strongest direction (channels
+/// scaled), or of the entry itself, count as not spanned. Rounding leaves about 1e-14.
 const SPAN_TOLERANCE: f64 = 1e-12;
 
+/// A pivot of an entry with slack below this fraction of its column is rounding: 1/√λ is lost in
+/// the data.
+const PIVOT_TOLERANCE: f64 = 1e-13;
+
 pub(super) struct PastFactor {
-    decomposition: Qr<f64>,
+    /// Of H̄ᵀ, with the past in `order`.
+    data: Qr<f64>,
     data_columns: usize,
-    /// √(1/λ) of every entry of `w_ini` that has slack, by its position.
-    slack_rows: Vec<(usize, f64)>,
-    past: PastMap,
+    lambda_g_root: f64,
+    /// Positions in `w_ini`: the entries whose slack is hard, then those that have slack.
+    order: Vec<usize>,
+    /// √(1/λ) of the entries that have slack, in that order.
+    slack_roots: Vec<f64>,
+    damping: Damping,
+    /// If the data do not span every past of the hard entries.
+    deficient: Option<Box<Deficient>>,
+    /// `l11·a` is the ordered `w_ini`, or, for a deficient past, `(α, w_s)`. Lower triangular.
+    l11: Mat<f64>,
     /// f0 = l21·a; (m+p)N×(length of a).
     l21: Mat<f64>,
     /// F, (m+p)N×(m+p)N.
     pub future: Mat<f64>,
+    /// `w_ini` in `order`.
+    ordered: Vec<f64>,
 }
 
-/// From `w_ini` to a.
-enum PastMap {
-    /// R11ᵀ; a solves R11ᵀ a = `w_ini`.
-    Full(Mat<f64>),
-    Deficient(Box<Deficient>),
-}
-
-/// A singular R11 taken apart.
+/// What the hard entries leave.
 struct Split {
-    past: Deficient,
-    l21: Mat<f64>,
-    future: Mat<f64>,
+    deficient: Option<Box<Deficient>>,
+    /// `R_hhᵀ`, or the identity for α.
+    corner: Mat<f64>,
+    /// `[R_hs R_hf]`, or `U₁ᵀ` times it.
+    above: Mat<f64>,
+    /// The triangular factor of all that is below, columns s and f.
+    below: Mat<f64>,
 }
 
 struct Deficient {
-    /// a = `map·w_ini`; rank×(length of `w_ini`).
+    /// α = `map·w_h`; rank×(hard entries).
     map: Mat<f64>,
-    /// Scaled pasts that the data span: `rank` orthonormal columns.
+    /// Scaled hard pasts that the data span: `rank` orthonormal columns.
     span: Mat<f64>,
     scales: Vec<f64>,
-    /// Left singular vectors of R11, square; the first `rank` belong to a.
+    /// `[U₁ U₂]`, square.
     left: Mat<f64>,
-    /// Orthonormal columns that turn z into the rest of ζ, one column per entry of z.
+    /// Orthonormal columns of the second QR decomposition.
     rest: Mat<f64>,
     scaled_past: Vec<f64>,
     coordinates: Vec<f64>,
@@ -82,58 +102,88 @@ impl PastFactor {
         let h = predictor.stacked();
         let (rows, data_columns) = h.shape();
         let past = compliance.len();
-        let slack_rows: Vec<_> = compliance
-            .iter()
-            .enumerate()
-            .filter(|&(_, &c)| c > 0.0)
-            .map(|(position, c)| (position, c.sqrt()))
-            .collect();
+        let (mut order, soft): (Vec<_>, Vec<_>) =
+            (0..past).partition(|&position| compliance[position] <= 0.0);
+        let hard = order.len();
+        order.extend_from_slice(&soft);
+        let slack_roots: Vec<_> = soft.iter().map(|&i| compliance[i].sqrt()).collect();
         // Rows of zeros change nothing and make the triangular factor square.
-        let height = (data_columns + slack_rows.len()).max(rows);
-        let mut m = Mat::zeros(height, rows);
-        let weight = 1.0 / lambda_g.sqrt();
+        let mut transposed = Mat::zeros(data_columns.max(rows), rows);
         for j in 0..rows {
-            for (entry, &value) in m.col_mut(j).iter_mut().zip(h.row(j).iter()) {
-                *entry = weight * value;
+            let source = h.row(order.get(j).copied().unwrap_or(j));
+            let target = transposed.col_mut(j);
+            target
+                .iter_mut()
+                .zip(source.iter())
+                .for_each(|(entry, &value)| *entry = value);
+        }
+        let data = transposed.qr();
+        let lambda_g_root = lambda_g.sqrt();
+        let r = Mat::from_fn(rows, rows, |i, j| {
+            if i <= j {
+                data.thin_R()[(i, j)] / lambda_g_root
+            } else {
+                0.0
+            }
+        });
+        check_finite(r.as_ref())?;
+
+        let scales: Vec<_> = order[..hard]
+            .iter()
+            .map(|&position| predictor.row_scales()[position])
+            .collect();
+        let mut split = Split::find(r.as_ref(), &scales)?;
+        split.clear_rounding(soft.len());
+        let damping = Damping::new(split.below.as_ref(), &slack_roots);
+        let (rank, soft) = (split.corner.nrows(), soft.len());
+        let damped = &damping.lower;
+        let l11 = Mat::from_fn(rank + soft, rank + soft, |i, j| {
+            match (i.checked_sub(rank), j.checked_sub(rank)) {
+                (None, None) => split.corner[(i, j)],
+                (None, Some(_)) => 0.0,
+                (Some(i), None) => split.above[(j, i)],
+                (Some(i), Some(j)) => damped[(i, j)],
+            }
+        });
+        let future = rows - past;
+        let l21 = Mat::from_fn(future, rank + soft, |i, j| match j.checked_sub(rank) {
+            None => split.above[(j, soft + i)],
+            Some(j) => damped[(soft + i, j)],
+        });
+        let factor = Self {
+            future: damped.submatrix(soft, soft, future, future).to_owned(),
+            data,
+            data_columns,
+            lambda_g_root,
+            order,
+            slack_roots,
+            damping,
+            deficient: split.deficient,
+            l11,
+            l21,
+            ordered: vec![0.0; past],
+        };
+        factor.check_slack_pivots(compliance)?;
+        Ok(factor)
+    }
+
+    /// A slack so expensive that 1/√λ is rounding beside the data would amplify that rounding.
+    fn check_slack_pivots(&self, compliance: &[f64]) -> Result<(), ProgramError> {
+        let rank = self.l11.nrows() - self.slack_roots.len();
+        for i in rank..self.l11.nrows() {
+            let (pivot, column) = (self.l11[(i, i)].abs(), self.l11.row(i).norm_l2());
+            if pivot <= PIVOT_TOLERANCE * column {
+                let row = self.order[self.order.len() - self.l11.nrows() + i];
+                return Err(ProgramError::SlackLost {
+                    row,
+                    lambda: 1.0 / compliance[row],
+                    pivot,
+                    column,
+                    tolerance: PIVOT_TOLERANCE,
+                });
             }
         }
-        for (k, &(position, root)) in slack_rows.iter().enumerate() {
-            m[(data_columns + k, position)] = root;
-        }
-        let decomposition = m.qr();
-        let r = decomposition.thin_R();
-        if !r.is_all_finite() {
-            return Err(ProgramError::Factorisation {
-                what: "the QR decomposition of the data matrix",
-            });
-        }
-        let r11 = r.submatrix(0, 0, past, past);
-        let r12 = r.submatrix(0, past, past, rows - past);
-        let r22 = r.submatrix(past, past, rows - past, rows - past);
-
-        // With slack on every entry R11 is nonsingular by construction.
-        let deficient = if slack_rows.len() < past {
-            let scales = &predictor.row_scales()[..past];
-            Split::find(r11, r12, r22, scales)?
-        } else {
-            None
-        };
-        let (past_map, l21, future) = match deficient {
-            Some(Split { past, l21, future }) => (PastMap::Deficient(Box::new(past)), l21, future),
-            None => (
-                PastMap::Full(linalg::lower_from_upper(r11)),
-                r12.transpose().to_owned(),
-                linalg::lower_from_upper(r22),
-            ),
-        };
-        Ok(Self {
-            data_columns,
-            slack_rows,
-            past: past_map,
-            l21,
-            future,
-            decomposition,
-        })
+        Ok(())
     }
 
     /// Length of a.
@@ -141,29 +191,40 @@ impl PastFactor {
         self.l21.ncols()
     }
 
-    /// Writes a and f0 for a past; returns the relative part of it that the data cannot explain.
+    /// Writes a and f0 for a past; returns the relative part of its hard entries that the data
+    /// cannot explain.
     pub fn predict(&mut self, past: &[f64], a: &mut [f64], f0: &mut [f64]) -> f64 {
-        let inconsistency = match &mut self.past {
-            PastMap::Full(l11) => {
-                a.copy_from_slice(past);
-                linalg::solve_lower(l11.as_ref(), a);
+        for (value, &position) in self.ordered.iter_mut().zip(&self.order) {
+            *value = past[position];
+        }
+        let (hard, soft) = self
+            .ordered
+            .split_at(self.order.len() - self.slack_roots.len());
+        let (from_hard, from_soft) = a.split_at_mut(self.l11.nrows() - soft.len());
+        let inconsistency = match &mut self.deficient {
+            None => {
+                from_hard.copy_from_slice(hard);
                 0.0
             }
-            PastMap::Deficient(deficient) => deficient.predict(past, a),
+            Some(deficient) => deficient.predict(hard, from_hard),
         };
+        from_soft.copy_from_slice(soft);
+        linalg::solve_lower(self.l11.as_ref(), a);
         linalg::multiply(f0, self.l21.as_ref(), a);
         inconsistency
     }
 
     /// g (one entry per data column) and `col(σ_u, σ_y)` from (a, z): ζ = Θ(a, z).
-    pub fn recover(&self, a: &[f64], z: &[f64], lambda_g: f64) -> (Vec<f64>, Vec<f64>) {
-        let basis = self.decomposition.Q_basis();
-        let coefficients = self.decomposition.Q_coeff();
-        let mut zeta = Mat::zeros(basis.nrows(), 1);
-        let top = match &self.past {
-            PastMap::Full(_) => [a, z].concat(),
-            PastMap::Deficient(deficient) => deficient.coordinates_of(a, z),
+    pub fn recover(&self, a: &[f64], z: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let (from_hard, from_soft) = a.split_at(a.len() - self.slack_roots.len());
+        let (below, slack_part) = self.damping.undo(&[from_soft, z].concat());
+        let top = match &self.deficient {
+            None => [from_hard, &below].concat(),
+            Some(deficient) => deficient.coordinates_of(from_hard, &below),
         };
+        let basis = self.data.Q_basis();
+        let coefficients = self.data.Q_coeff();
+        let mut zeta = Mat::zeros(basis.nrows(), 1);
         zeta.col_as_slice_mut(0)[..top.len()].copy_from_slice(&top);
         let scratch = apply_scratch::<f64>(basis.nrows(), coefficients.nrows(), 1);
         apply_householder(
@@ -174,75 +235,107 @@ impl PastFactor {
             Par::Seq,
             MemStack::new(&mut MemBuffer::new(scratch)),
         );
-        let zeta = zeta.col_as_slice(0);
-        let g = zeta[..self.data_columns]
+        let g = zeta.col_as_slice(0)[..self.data_columns]
             .iter()
-            .map(|value| value / lambda_g.sqrt())
+            .map(|value| value / self.lambda_g_root)
             .collect();
-        let past = self.decomposition.thin_R().ncols() - self.future.nrows();
-        let mut slack = vec![0.0; past];
-        for (k, &(position, root)) in self.slack_rows.iter().enumerate() {
-            slack[position] = -root * zeta[self.data_columns + k];
+        let mut slack = vec![0.0; self.order.len()];
+        let soft = &self.order[self.order.len() - self.slack_roots.len()..];
+        for ((&position, root), value) in soft.iter().zip(&self.slack_roots).zip(slack_part) {
+            slack[position] = -root * value;
         }
         (g, slack)
     }
 }
 
+fn check_finite(r: MatRef<'_, f64>) -> Result<(), ProgramError> {
+    for column in 0..r.ncols() {
+        let bad = r.col(column).iter().position(|value| !value.is_finite());
+        if let Some(row) = bad {
+            return Err(ProgramError::Factorisation {
+                what: "the QR decomposition of the data matrix",
+                row,
+                column,
+            });
+        }
+    }
+    Ok(())
+}
+
 impl Split {
-    /// `None` if R11 is nonsingular.
-    fn find(
-        r11: MatRef<'_, f64>,
-        r12: MatRef<'_, f64>,
-        r22: MatRef<'_, f64>,
-        scales: &[f64],
-    ) -> Result<Option<Self>, ProgramError> {
-        let past = r11.ncols();
-        let scaled = Mat::from_fn(past, past, |i, j| {
-            if i <= j { r11[(i, j)] / scales[j] } else { 0.0 }
-        });
-        let svd = scaled.svd().map_err(|_| ProgramError::Factorisation {
-            what: "the singular value decomposition of the past",
+    /// `scales`: size of every hard entry; they are the first columns of `r`.
+    fn find(r: MatRef<'_, f64>, scales: &[f64]) -> Result<Self, ProgramError> {
+        let hard = scales.len();
+        let others = r.ncols() - hard;
+        let nonsingular = || Self {
+            deficient: None,
+            corner: linalg::lower_from_upper(r.submatrix(0, 0, hard, hard)),
+            above: r.submatrix(0, hard, hard, others).to_owned(),
+            below: r.submatrix(hard, hard, others, others).to_owned(),
+        };
+        if hard == 0 {
+            return Ok(nonsingular());
+        }
+        let scaled = Mat::from_fn(hard, hard, |i, j| r[(i, j)] / scales[j]);
+        let svd = scaled.svd().map_err(|_| ProgramError::PastDecomposition {
+            size: hard,
+            smallest: diagonal_size(r, hard).fold(f64::INFINITY, f64::min),
+            largest: diagonal_size(r, hard).fold(0.0, f64::max),
         })?;
         let sigma = svd.S().column_vector();
         let limit = SPAN_TOLERANCE * sigma.iter().copied().fold(0.0, f64::max);
         let rank = sigma.iter().filter(|&&s| s > limit).count();
-        if rank == past {
-            return Ok(None);
+        if rank == hard {
+            return Ok(nonsingular());
         }
         let left = svd.U().to_owned();
         let span = svd.V().subcols(0, rank).to_owned();
-        let map = Mat::from_fn(rank, past, |i, j| span[(j, i)] / (sigma[i] * scales[j]));
-        let kept = left.subcols(0, rank);
-        let l21 = r12.transpose() * kept;
-        let dropped = left.subcols(rank, past - rank).transpose() * r12;
-        let future = r22.ncols();
-        let height = past - rank + future;
-        let stacked = Mat::from_fn(height, future, |i, j| {
-            if i < past - rank {
-                dropped[(i, j)]
-            } else if i - (past - rank) <= j {
-                r22[(i - (past - rank), j)]
-            } else {
-                0.0
+        let map = Mat::from_fn(rank, hard, |i, j| span[(j, i)] / (sigma[i] * scales[j]));
+
+        let turned = left.transpose() * r.submatrix(0, hard, hard, others);
+        let dropped = hard - rank;
+        let stacked = Mat::from_fn(dropped + others, others, |i, j| {
+            match i.checked_sub(dropped) {
+                None => turned[(rank + i, j)],
+                Some(i) => r[(hard + i, hard + j)],
             }
         });
         let decomposition = stacked.qr();
-        let split = Deficient {
-            map,
-            span,
-            scales: scales.to_vec(),
-            left,
-            rest: decomposition.compute_thin_Q(),
-            scaled_past: vec![0.0; past],
-            coordinates: vec![0.0; rank],
-        };
-        let f = linalg::lower_from_upper(decomposition.thin_R());
-        Ok(Some(Self {
-            past: split,
-            l21,
-            future: f,
-        }))
+        Ok(Self {
+            corner: Mat::identity(rank, rank),
+            above: turned.subrows(0, rank).to_owned(),
+            below: linalg::lower_from_upper(decomposition.thin_R())
+                .transpose()
+                .to_owned(),
+            deficient: Some(Box::new(Deficient {
+                map,
+                span,
+                scales: scales.to_vec(),
+                left,
+                rest: decomposition.compute_thin_Q(),
+                scaled_past: vec![0.0; hard],
+                coordinates: vec![0.0; rank],
+            })),
+        })
     }
+
+    /// Sets what rounding left of directions that are not spanned to zero, in the `soft` columns:
+    /// a small enough 1/√λ would take it for data.
+    fn clear_rounding(&mut self, soft: usize) {
+        for k in 0..soft {
+            let kept = self.below.col(k).norm_l2();
+            let limit = SPAN_TOLERANCE * kept.hypot(self.above.col(k).norm_l2());
+            for value in self.below.col_as_slice_mut(k) {
+                if value.abs() <= limit {
+                    *value = 0.0;
+                }
+            }
+        }
+    }
+}
+
+fn diagonal_size(r: MatRef<'_, f64>, size: usize) -> impl Iterator<Item = f64> + '_ {
+    (0..size).map(move |i| r[(i, i)].abs())
 }
 
 impl Deficient {
@@ -271,14 +364,14 @@ impl Deficient {
         if size > 0.0 { rest / size } else { 0.0 }
     }
 
-    /// Coordinates of ζ with respect to Θ.
-    fn coordinates_of(&self, a: &[f64], z: &[f64]) -> Vec<f64> {
-        let (past, rank) = (self.left.nrows(), a.len());
+    /// Coordinates with respect to `Θ_d` from α and those of the second QR decomposition.
+    fn coordinates_of(&self, alpha: &[f64], below: &[f64]) -> Vec<f64> {
+        let (hard, rank) = (self.left.nrows(), alpha.len());
         let mut rest = vec![0.0; self.rest.nrows()];
-        linalg::multiply(&mut rest, self.rest.as_ref(), z);
-        let (dropped, bottom) = rest.split_at(past - rank);
-        let mut top = vec![0.0; past];
-        linalg::multiply(&mut top, self.left.as_ref(), &[a, dropped].concat());
+        linalg::multiply(&mut rest, self.rest.as_ref(), below);
+        let (dropped, bottom) = rest.split_at(hard - rank);
+        let mut top = vec![0.0; hard];
+        linalg::multiply(&mut top, self.left.as_ref(), &[alpha, dropped].concat());
         top.extend_from_slice(bottom);
         top
     }

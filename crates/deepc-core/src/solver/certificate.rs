@@ -22,7 +22,14 @@ pub struct Certificate {
     /// |xᵀr| + Σ |complementarity of row i|; a soft row's term is the Fenchel gap between its
     /// penalty and its multiplier.
     pub duality_gap: f64,
-    /// The largest of the three, each divided by max(1, the quantities it is a difference of).
+    /// The largest of the three, each divided by its scale (0/0 is 0):
+    /// - a violation by max(1, the row's value): what 1 means in a row is its author's choice;
+    /// - the dual residual by the largest of the gradient's parts Px, q and Aᵀμ;
+    /// - the gap by the parts of the cost, or, if that is larger (the cost may be 0 at the
+    ///   optimum), by what a single variable could save from x = 0 if there were no rows,
+    ///   maxⱼ ½qⱼ²/Pⱼⱼ, but no more than 1.
+    ///
+    /// So a program whose costs are all small is held to the same digits as any other.
     pub relative: f64,
 }
 
@@ -58,6 +65,8 @@ pub(super) struct CertificateWork {
     hessian_x: Vec<f64>,
     gradient: Vec<f64>,
     rows_x: Vec<f64>,
+    /// Pⱼⱼ.
+    curvature: Vec<f64>,
 }
 
 impl CertificateWork {
@@ -66,6 +75,7 @@ impl CertificateWork {
             hessian_x: vec![0.0; problem.variable_count()],
             gradient: vec![0.0; problem.variable_count()],
             rows_x: vec![0.0; problem.row_count()],
+            curvature: curvature(problem),
         }
     }
 
@@ -84,8 +94,7 @@ impl CertificateWork {
             .multiply_transposed_add(&mut self.gradient, dual);
         let gradient_scale = linalg::max_abs(&self.gradient)
             .max(linalg::max_abs(&self.hessian_x))
-            .max(linalg::max_abs(vectors.linear))
-            .max(1.0);
+            .max(linalg::max_abs(vectors.linear));
         let parts = self.hessian_x.iter().zip(vectors.linear);
         for (gradient, (hessian_x, linear)) in self.gradient.iter_mut().zip(parts) {
             *gradient += hessian_x + linear;
@@ -106,11 +115,12 @@ impl CertificateWork {
         let duality_gap = linalg::dot(&self.gradient, x).abs() + rows.gap;
         let dual_residual = linalg::max_abs(&self.gradient).max(rows.stray_multiplier);
         let objective = quadratic + linear + rows.penalty;
-        let cost_scale = (quadratic.abs() + linear.abs() + rows.penalty).max(1.0);
+        let cost_scale = (quadratic.abs() + linear.abs() + rows.penalty)
+            .max(largest_saving(&self.curvature, vectors.linear).min(1.0));
         let relative = [
             rows.relative_violation,
-            dual_residual / gradient_scale,
-            duality_gap / cost_scale,
+            ratio(dual_residual, gradient_scale),
+            ratio(duality_gap, cost_scale),
         ];
         Certificate {
             objective,
@@ -119,6 +129,32 @@ impl CertificateWork {
             duality_gap,
             relative: linalg::max_abs(&relative),
         }
+    }
+}
+
+/// Pⱼⱼ of every variable.
+pub(super) fn curvature(problem: &QpProblem) -> Vec<f64> {
+    let mut diagonal = vec![0.0; problem.variable_count()];
+    for (i, j, value) in problem.hessian().triplets() {
+        if i == j {
+            diagonal[i] += value;
+        }
+    }
+    diagonal
+}
+
+/// maxⱼ ½qⱼ²/Pⱼⱼ over the variables with Pⱼⱼ > 0.
+pub(super) fn largest_saving(curvature: &[f64], linear: &[f64]) -> f64 {
+    let pairs = curvature.iter().zip(linear).filter(|(p, _)| **p > 0.0);
+    pairs.fold(0.0, |max, (p, q)| max.max(0.5 * q * (q / p)))
+}
+
+/// With 0/0 = 0, and NaN if either is.
+fn ratio(part: f64, scale: f64) -> f64 {
+    if part == 0.0 {
+        scale * 0.0
+    } else {
+        part / scale
     }
 }
 

@@ -1,10 +1,17 @@
-//! Clarabel on the whole program as it is.
+//! Clarabel on the whole program.
+//!
+//! Clarabel's tolerances are relative above and absolute below 1, so it is given a program of
+//! size 1: with x = s·v and the cost divided by s²κ, P and the quadratic penalties are divided by
+//! the constant κ, q and the linear penalties by sκ, and the bounds by s. κ is the size of the
+//! curvature; s follows q and the bounds from step to step and touches no matrix. Rows that move
+//! far beyond 1 per unit of cost are divided by a size of their own, with their violations. All
+//! sizes are powers of two, so that nothing is rounded.
 
 use std::time::Instant;
 
 use clarabel::solver::{DefaultSolver, IPSolver, SupportedConeT};
 
-use super::certificate::{CertificateWork, INACCURATE_TOLERANCE};
+use super::certificate::{CertificateWork, INACCURATE_TOLERANCE, curvature, largest_saving};
 use super::clarabel_settings::{ClarabelSettings, Remaining, clarabel_matrix, translate};
 use super::error::SolverError;
 use super::problem::{OwnedVectors, QpProblem, QpVectors, Screening};
@@ -21,14 +28,80 @@ pub struct ClarabelDirect {
     settings: ClarabelSettings,
     vectors: OwnedVectors,
     native: Option<Native>,
+    sizes: Sizes,
     solution: QpSolution,
     certificate_work: CertificateWork,
+}
+
+/// What the size of the optimum is judged by.
+struct Sizes {
+    /// Pⱼⱼ.
+    curvature: Vec<f64>,
+    /// `Σⱼ aᵢⱼ²/Pⱼⱼ` over Pⱼⱼ > 0: how easily row i moves.
+    mobility: Vec<f64>,
+    /// κ.
+    cost: f64,
+}
+
+impl Sizes {
+    fn new(problem: &QpProblem) -> Self {
+        let curvature = curvature(problem);
+        let mut mobility = vec![0.0; problem.row_count()];
+        for (i, j, value) in problem.rows().triplets() {
+            if curvature[j] > 0.0 {
+                mobility[i] += value * (value / curvature[j]);
+            }
+        }
+        let logarithms = || curvature.iter().filter(|p| **p > 0.0).map(|p| p.log2());
+        let count = logarithms().count().max(1);
+        let mean = logarithms().sum::<f64>() / count as f64;
+        Self {
+            // Clarabel copes with large costs by itself.
+            cost: mean.round().min(0.0).exp2(),
+            curvature,
+            mobility,
+        }
+    }
+
+    /// s: s²κ is about the largest cost that a single variable can save or a single row can
+    /// force from x = 0, and at most 1: no cost is given to Clarabel smaller than it is.
+    fn step(&self, problem: &QpProblem, vectors: &OwnedVectors) -> f64 {
+        let mut cost = largest_saving(&self.curvature, &vectors.linear);
+        for (i, mobility) in self.mobility.iter().enumerate() {
+            let distance = vectors.lower[i].max(-vectors.upper[i]).max(0.0);
+            if distance > 0.0 && *mobility > 0.0 {
+                let forced = 0.5 * distance * (distance / mobility);
+                let soft = problem.soft()[i].map(|penalty| penalty.cost(distance));
+                cost = cost.max(soft.map_or(forced, |soft| soft.min(forced)));
+            }
+        }
+        power_of_two((cost.min(1.0) / self.cost).sqrt())
+    }
+
+    /// Divisors of the rows for steps about as large as `step`. A row is never made to count
+    /// for less than 1 in its own units.
+    fn rows(&self, step: f64) -> Vec<f64> {
+        let sizes = self.mobility.iter();
+        sizes
+            .map(|mobility| power_of_two((mobility * self.cost).sqrt().min(1.0 / step).max(1.0)))
+            .collect()
+    }
+}
+
+/// The nearest power of two; 1 for what is not a proper size.
+fn power_of_two(size: f64) -> f64 {
+    let rounded = size.log2().round().exp2();
+    if rounded.is_normal() { rounded } else { 1.0 }
 }
 
 /// Clarabel's side: `min ½vᵀP̂v + q̂ᵀv, Âv + s = b, s ∈ cones` with v = (x, violations).
 struct Native {
     solver: DefaultSolver<f64>,
     kinds: Vec<RowKind>,
+    /// s at set-up.
+    step: f64,
+    /// Divisor of every row of ours.
+    row_sizes: Vec<f64>,
     targets: Vec<Targets>,
     linear: Vec<f64>,
     right_hand_side: Vec<f64>,
@@ -60,6 +133,7 @@ impl ClarabelDirect {
             settings,
             vectors: OwnedVectors::new(problem),
             native: None,
+            sizes: Sizes::new(problem),
             solution: QpSolution::empty(problem.variable_count(), problem.row_count()),
             certificate_work: CertificateWork::new(problem),
         })
@@ -84,12 +158,20 @@ impl ClarabelDirect {
             Screening::Infeasible => return QpStatus::Infeasible,
             Screening::Proceed => {}
         }
+        if self.origin_is_optimal() {
+            return self.certify_origin();
+        }
+        let step = self.sizes.step(&self.problem, &self.vectors);
         let kinds: Vec<_> = (0..self.problem.row_count())
             .map(|row| self.kind(row))
             .collect();
-        let native = match self.native.take().filter(|native| native.kinds == kinds) {
+        let native = match self
+            .native
+            .take()
+            .filter(|native| native.kinds == kinds && native.fits(step))
+        {
             Some(native) => native,
-            None => match self.set_up(kinds) {
+            None => match self.set_up(kinds, step) {
                 Ok(native) => native,
                 Err(_) => return QpStatus::NumericalError,
             },
@@ -99,9 +181,12 @@ impl ClarabelDirect {
         if let Some(status) = remaining.spent() {
             return status;
         }
-        if native
-            .load(&self.vectors, self.settings, remaining)
-            .is_none()
+        let mut limits = self.settings.native(true);
+        remaining.limit(&mut limits);
+        if native.solver.update_settings(limits).is_err()
+            || native
+                .load(&self.problem, &self.vectors, [step, self.sizes.cost])
+                .is_none()
         {
             return QpStatus::NumericalError;
         }
@@ -117,11 +202,38 @@ impl ClarabelDirect {
             };
         }
         let variables = self.problem.variable_count();
-        self.solution.primal.copy_from_slice(&result.x[..variables]);
-        for (dual, targets) in self.solution.dual.iter_mut().zip(&native.targets) {
+        for (x, value) in self.solution.primal.iter_mut().zip(&result.x[..variables]) {
+            *x = step * value;
+        }
+        let rows = native.targets.iter().zip(&native.row_sizes);
+        for (dual, (targets, row_size)) in self.solution.dual.iter_mut().zip(rows) {
             let part = |target: Option<usize>| target.map_or(0.0, |row| result.z[row]);
             *dual = part(targets.equality) + part(targets.upper) - part(targets.lower);
+            *dual *= step * self.sizes.cost / row_size;
         }
+        self.certify()
+    }
+
+    /// Without a q, x = 0 is an optimum if it meets every row: P is positive semidefinite. An
+    /// interior point has no size to be accurate to there.
+    fn origin_is_optimal(&self) -> bool {
+        let OwnedVectors {
+            linear,
+            lower,
+            upper,
+        } = &self.vectors;
+        linear.iter().all(|q| *q == 0.0)
+            && lower.iter().zip(upper).all(|(l, u)| *l <= 0.0 && *u >= 0.0)
+    }
+
+    /// x = 0 and μ = 0.
+    fn certify_origin(&mut self) -> QpStatus {
+        self.solution.primal.fill(0.0);
+        self.solution.dual.fill(0.0);
+        self.certify()
+    }
+
+    fn certify(&mut self) -> QpStatus {
         let (solution, vectors) = (&mut self.solution, self.vectors.as_ref());
         solution.certificate = self.certificate_work.certify(
             &self.problem,
@@ -132,7 +244,7 @@ impl ClarabelDirect {
         grade(solution.certificate.relative, self.settings.tolerance)
     }
 
-    fn set_up(&self, kinds: Vec<RowKind>) -> Result<Native, SolverError> {
+    fn set_up(&self, kinds: Vec<RowKind>, step: f64) -> Result<Native, SolverError> {
         let soft = self.problem.soft();
         let mut targets = vec![Targets::default(); kinds.len()];
         let mut count = 0;
@@ -155,8 +267,14 @@ impl ClarabelDirect {
 
         let mut hessian = self.problem.hessian().triplets();
         hessian.retain(|&(i, j, _)| i <= j);
+        let cost = self.sizes.cost;
+        for (.., value) in &mut hessian {
+            *value /= cost;
+        }
+        let row_sizes = self.sizes.rows(step);
         let mut rows = Vec::new();
         for (i, j, value) in self.problem.rows().triplets() {
+            let value = value / row_sizes[i];
             let Targets {
                 equality,
                 upper,
@@ -172,11 +290,14 @@ impl ClarabelDirect {
         }
         // Clarabel's scaling of the cost looks at q once, here.
         let mut linear = self.vectors.linear.clone();
-        for (penalty, target) in soft.iter().zip(&targets) {
+        for q in &mut linear {
+            *q /= step * cost;
+        }
+        for ((penalty, target), size) in soft.iter().zip(&targets).zip(&row_sizes) {
             let Some(penalty) = penalty else { continue };
             let violation = linear.len();
-            linear.push(penalty.linear);
-            hessian.push((violation, violation, penalty.quadratic));
+            linear.push(penalty.linear * size / (step * cost));
+            hessian.push((violation, violation, penalty.quadratic * size * size / cost));
             let sides = [target.upper, target.lower, next()];
             rows.extend(
                 sides
@@ -205,6 +326,8 @@ impl ClarabelDirect {
         Ok(Native {
             solver,
             kinds,
+            step,
+            row_sizes,
             targets,
             linear,
             right_hand_side,
@@ -224,25 +347,33 @@ pub(super) fn grade(relative: f64, tolerance: f64) -> QpStatus {
 }
 
 impl Native {
-    /// Hands the moving vectors and what is left of the budget to Clarabel.
+    /// Whether `step` is near enough to that of set-up.
+    fn fits(&self, step: f64) -> bool {
+        (1.0 / 64.0..=64.0).contains(&(step / self.step))
+    }
+
+    /// Hands the moving vectors to Clarabel, in its size (s, κ).
     fn load(
         &mut self,
+        problem: &QpProblem,
         vectors: &OwnedVectors,
-        settings: ClarabelSettings,
-        remaining: Remaining,
+        [step, cost]: [f64; 2],
     ) -> Option<()> {
-        self.linear[..vectors.linear.len()].copy_from_slice(&vectors.linear);
+        let penalties = problem.soft().iter().zip(&self.row_sizes);
+        let penalties = penalties.filter_map(|(soft, size)| soft.map(|soft| soft.linear * size));
+        let linear = vectors.linear.iter().copied().chain(penalties);
+        for (scaled, value) in self.linear.iter_mut().zip(linear) {
+            *scaled = value / (step * cost);
+        }
         for (i, target) in self.targets.iter().enumerate() {
+            let size = step * self.row_sizes[i];
             for row in [target.equality, target.upper].into_iter().flatten() {
-                self.right_hand_side[row] = vectors.upper[i];
+                self.right_hand_side[row] = vectors.upper[i] / size;
             }
             if let Some(row) = target.lower {
-                self.right_hand_side[row] = -vectors.lower[i];
+                self.right_hand_side[row] = -vectors.lower[i] / size;
             }
         }
-        let mut native = settings.native(true);
-        remaining.limit(&mut native);
-        self.solver.update_settings(native).ok()?;
         self.solver.update_q(&self.linear).ok()?;
         self.solver.update_b(&self.right_hand_side).ok()
     }

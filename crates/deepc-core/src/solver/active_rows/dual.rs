@@ -32,6 +32,12 @@ pub(super) fn solve(
 ) -> (QpStatus, u32) {
     let variables = variables(working);
     let n = variables.len();
+    // Clarabel's tolerances are absolute below 1: multipliers are given in units of `size`.
+    let size = working
+        .iter()
+        .map(|row| row.violation(unconstrained[row.row]).abs())
+        .fold(0.0, f64::max);
+    let size = if size.is_normal() { size } else { 1.0 };
     let mut hessian = Vec::with_capacity(n * (n + 1) / 2);
     let mut linear = Vec::with_capacity(n);
     let mut rows = Vec::new();
@@ -46,14 +52,14 @@ pub(super) fn solve(
             }
             hessian.push((i, j, value));
         }
-        linear.push(-own.violation(unconstrained[own.row]));
+        linear.push(-own.violation(unconstrained[own.row]) / size);
         if !variable.free {
             rows.push((right_hand_side.len(), j, -1.0));
             right_hand_side.push(0.0);
         }
         if let Some(cap) = variable.cap {
             // Divided by ρ, so that a large one does not loosen Clarabel's relative tolerance.
-            rows.push((right_hand_side.len(), j, 1.0 / cap));
+            rows.push((right_hand_side.len(), j, size / cap));
             right_hand_side.push(1.0);
         }
     }
@@ -85,7 +91,7 @@ pub(super) fn solve(
             row.multiplier = 0.0;
         }
         for (variable, &value) in variables.iter().zip(&point.x) {
-            let value = if variable.free { value } else { value.max(0.0) };
+            let value = size * if variable.free { value } else { value.max(0.0) };
             let value = variable.cap.map_or(value, |cap| value.min(cap));
             working[variable.working].multiplier += value;
         }

@@ -196,8 +196,9 @@ impl ActiveRows {
                 &mut self.working,
                 &self.constant.gram,
                 &self.unconstrained_rows,
+                remaining.iterations,
             );
-            self.solution.iterations += iterations.min(remaining.iterations);
+            self.solution.iterations += iterations;
             if !result {
                 let status = self.solve_small_dual(budget, start);
                 if status != QpStatus::Solved {
@@ -259,7 +260,12 @@ impl ActiveRows {
         if status == QpStatus::Solved {
             // Sharpens Clarabel's point to rounding where its active set is consistent.
             let mut sharpened = self.working.clone();
-            if refine(&mut sharpened, gram, c).0 {
+            let left = budget
+                .max_iterations
+                .saturating_sub(self.solution.iterations);
+            let (consistent, guesses) = refine(&mut sharpened, gram, c, left);
+            self.solution.iterations += guesses;
+            if consistent {
                 self.working = sharpened;
             }
         }

@@ -25,13 +25,15 @@ const SIGN_TOLERANCE: f64 = 1e-12;
 /// Solves the optimality conditions for the states guessed, corrects the states whose sign
 /// comes out wrong, and repeats (a primal-dual active-set iteration; Hintermüller, Ito, Kunisch
 /// 2003). Returns whether it ended in a consistent set (multipliers and states are then optimal
-/// for the working set) and the number of factorisations.
+/// for the working set) and the number of factorisations, at most `allowed`.
 pub(super) fn refine(
     working: &mut [WorkingRow],
     gram: &Mat<f64>,
     unconstrained: &[f64],
+    allowed: u32,
 ) -> (bool, u32) {
-    for guess in 1..=MAX_GUESSES {
+    let allowed = allowed.min(MAX_GUESSES);
+    for guess in 1..=allowed {
         if !solve_for_states(working, gram, unconstrained) {
             return (false, guess);
         }
@@ -39,7 +41,7 @@ pub(super) fn refine(
             return (true, guess);
         }
     }
-    (false, MAX_GUESSES)
+    (false, allowed)
 }
 
 /// `(G_AA + diag ε) μ_A = d_A + ερ − G_AC μ_C` over the pushing rows A, where ε = 1/w for a row

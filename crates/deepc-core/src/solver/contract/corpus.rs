@@ -126,6 +126,7 @@ pub fn corpus() -> Vec<CorpusProblem> {
     let mut all = hard_rows();
     all.extend(soft_rows());
     all.extend(awkward());
+    all.extend(small_costs());
     for (name, n, seed) in [
         ("generated, 3 variables", 3, 1),
         ("generated, 8 variables", 8, 2),
@@ -322,6 +323,64 @@ fn awkward() -> Vec<CorpusProblem> {
             )
             .ends(QpStatus::Unbounded),
         ),
+    ]
+}
+
+/// Costs of 1e-8 and far below: `Solved` must mean as much as for costs of 1.
+fn small_costs() -> Vec<CorpusProblem> {
+    let mut dear = Draft::hard(
+        "small weights, soft",
+        mat![[1e-14]],
+        &[-2e-14],
+        mat![[1.0]],
+        &[(-INF, 1.0)],
+    );
+    dear.soft[0] = Some(SoftPenalty {
+        linear: 0.4e-14,
+        quadratic: 1e-14,
+    });
+    vec![
+        Draft::hard(
+            "small weights",
+            mat![[2e-8, 0.0], [0.0, 2e-8]],
+            &[-6e-8, 2e-8],
+            Mat::identity(2, 2),
+            &[(-1.0, 2.0), (-0.5, 5.0)],
+        )
+        .at(&[2.0, -0.5], -8.75e-8),
+        Draft::hard(
+            "small q and bounds",
+            mat![[2.0, 0.0], [0.0, 2.0]],
+            &[-6e-5, 2e-5],
+            Mat::identity(2, 2),
+            &[(-1e-5, 2e-5), (-0.5e-5, 5e-5)],
+        )
+        .at(&[2e-5, -0.5e-5], -8.75e-10),
+        Draft::hard(
+            "small equality",
+            Mat::identity(3, 3),
+            &[0.0; 3],
+            mat![[1.0, 1.0, 1.0]],
+            &[(3e-5, 3e-5)],
+        )
+        .at(&[1e-5, 1e-5, 1e-5], 1.5e-10),
+        dear.at(&[1.3], -1.59e-14),
+        Draft::hard(
+            "no cost at the optimum",
+            Mat::identity(2, 2),
+            &[-1e-5, 1e-5],
+            Mat::identity(2, 2),
+            &[(-1e-5, 0.0), (0.0, 1e-5)],
+        )
+        .at(&[0.0, 0.0], 0.0),
+        Draft::hard(
+            "nothing to do",
+            Mat::identity(2, 2),
+            &[0.0, 0.0],
+            Mat::identity(2, 2),
+            &[(-1.0, 1.0), (0.0, 1.0)],
+        )
+        .at(&[0.0, 0.0], 0.0),
     ]
 }
 
