@@ -1,144 +1,123 @@
-//! What `DeePC` costs at the paper's size: 600×3001, 2 inputs, 1 output, `T_ini` = N = 100.
+//! What `DeePC` costs at the original study's size: 600×3001, 2 inputs, 1 output, `T_ini` = N = 100.
 
 use std::hint::black_box;
+use std::time::Duration;
 
-use criterion::{Criterion, criterion_group, criterion_main};
-use deepc_core::data::Dataset;
-use deepc_core::hankel::{HankelMatrix, Horizons, PersistentlyExciting};
-use deepc_core::predictor::Predictor;
-use deepc_core::program::{
-    Bounds, CondensedProgram, DeepcProgram, DeepcSettings, Moment, Normalisation, OutputBounds,
-    PlanOrigin, Regularisation, Slack,
-};
-use deepc_core::solver::{ActiveRows, ClarabelSettings, QpSolver, SolveBudget};
-use faer::Mat;
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
+use benches::backend::{self, ACTIVE_SET, ADMM, CLARABEL};
+use benches::case::{Activity, Case};
+use benches::replay::Replay;
+use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use deepc_core::hankel::HankelMatrix;
+use deepc_core::program::{CondensedProgram, DeepcProgram, Plan, SparseProgram};
+use deepc_core::solver::{QpSolver, SolveBudget};
 
-const SAMPLES: usize = 3200;
-const HORIZONS: Horizons = Horizons {
-    past: 100,
-    future: 100,
-};
-/// Where the second input stands: a target speed in km/h, say.
-const OFFSET: f64 = 100.0;
+/// Steps of one sample; consecutive, so that a warm start is worth what it is in control.
+const STEPS: usize = 100;
 
-/// A well-damped oscillation driven by the first input and a little by the second, measured with
-/// noise. The inputs are slow noise plus white noise.
-fn recording(samples: usize) -> (Mat<f64>, Mat<f64>) {
-    let mut rng = ChaCha8Rng::seed_from_u64(1);
-    let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
-    let (mut slow, mut state) = (0.0, [0.0, 0.0]);
-    let (mut inputs, mut outputs) = (Mat::zeros(samples, 2), Mat::zeros(samples, 1));
-    for k in 0..samples {
-        slow = 0.99 * slow + 5.0 * normal();
-        let input = [slow + 5.0 * normal(), OFFSET + normal()];
-        let drive = 4e-4 * input[0] + 1e-5 * (input[1] - OFFSET);
-        state = [1.93 * state[0] - 0.94 * state[1] + drive, state[0]];
-        inputs[(k, 0)] = input[0];
-        inputs[(k, 1)] = input[1];
-        outputs[(k, 0)] = state[0] + 1e-3 * normal();
-    }
-    (inputs, outputs)
-}
-
-fn exciting() -> PersistentlyExciting {
-    let (inputs, outputs) = recording(SAMPLES);
-    let mut data = Dataset::new(0.01, ["u1", "u2"], ["y"]).expect("the names differ");
-    data.push_record(inputs, outputs)
-        .expect("the record is finite");
-    let hankel = HankelMatrix::build(&data, HORIZONS).expect("the record is long enough");
-    hankel
-        .require_persistently_exciting(8)
-        .expect("white noise excites")
-}
-
-fn settings(limit: f64) -> DeepcSettings {
-    DeepcSettings {
-        input_weights: vec![1.0, 5e-4],
-        output_weights: vec![0.0],
-        regularisation: Regularisation {
-            lambda_g: 60.0,
-            normalisation: Normalisation::PerColumn,
-        },
-        input_slack: Slack::Penalty(1e8),
-        output_slack: Slack::Penalty(1e8),
-        input_bounds: vec![Bounds::between(-200.0, 200.0), Bounds::between(90.0, 120.0)],
-        output_bounds: vec![OutputBounds::soft(-limit, limit, 1e5, 1e6)],
-    }
-}
+const TOLERANCE: f64 = 1e-9;
 
 fn set_up(criterion: &mut Criterion) {
-    let data = exciting();
+    let case = Case::paper(Activity::Some, 0.0);
+    let data = case.data();
     let mut group = criterion.benchmark_group("deepc set-up 600x3001");
     group.sample_size(10);
-    group.bench_function("excitation report", |b| {
-        b.iter(|| data.hankel().excitation(8));
+    group.bench_function("hankel matrix", |b| {
+        b.iter(|| HankelMatrix::build(&data, case.horizons));
     });
-    group.bench_function("exact reduction", |b| b.iter(|| Predictor::exact(&data)));
-    let full = Predictor::full(&data);
+    let hankel = HankelMatrix::build(&data, case.horizons).expect("the recording is long enough");
+    group.bench_function("excitation report", |b| b.iter(|| hankel.excitation(8)));
+    group.bench_function("exact reduction", |b| {
+        b.iter(|| case.reduced_predictor(&data));
+    });
+    let full = case.full_predictor(&data);
     group.bench_function("condensed program", |b| {
-        b.iter(|| CondensedProgram::new(&full, &settings(1.0)));
+        b.iter(|| CondensedProgram::new(&full, &case.settings()));
     });
-    let program = CondensedProgram::new(&full, &settings(1.0)).expect("the settings are valid");
-    group.bench_function("active rows", |b| {
-        b.iter(|| ActiveRows::new(program.qp(), ClarabelSettings::default()));
+    let program = CondensedProgram::new(&full, &case.settings()).expect("the settings are valid");
+    group.bench_function("active-set", |b| {
+        b.iter(|| backend::solver(ACTIVE_SET, program.qp(), TOLERANCE));
     });
     group.finish();
 }
 
-/// Steps through 100 consecutive moments of the recording, so that a warm start is worth what it
-/// is in a control loop. A tight limit keeps rows active in nearly every step.
-fn step(criterion: &mut Criterion) {
-    let predictor = Predictor::exact(&exciting()).expect("the SVD converges");
-    let (inputs, outputs) = recording(SAMPLES);
+fn steps(
+    program: &mut dyn DeepcProgram,
+    solver: &mut dyn QpSolver,
+    replay: &Replay,
+    range: std::ops::Range<usize>,
+) {
+    for k in range {
+        let moment = black_box(replay.moment(k));
+        let plan = program.solve(&moment, solver, &SolveBudget::generous());
+        assert!(plan.is_ok_and(Plan::is_usable));
+    }
+}
+
+fn condensed(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("deepc 100 steps, condensed");
     group.sample_size(20);
-    for (name, limit) in [("no bound active", 1e3), ("some bounds active", 0.5)] {
-        let program = CondensedProgram::new(&predictor, &settings(limit));
+    for (name, activity) in [
+        ("no bound active", Activity::None),
+        ("some bounds active", Activity::Some),
+        ("nearly all inputs at bounds", Activity::NearlyAll),
+    ] {
+        let case = Case::paper(activity, 0.0);
+        let full = case.full_predictor(&case.data());
+        let program = CondensedProgram::new(&full, &case.settings());
         let mut program = program.expect("the settings are valid");
-        let solver = ActiveRows::new(program.qp(), ClarabelSettings::default());
+        let solver = backend::solver(ACTIVE_SET, program.qp(), TOLERANCE);
         let mut solver = solver.expect("the Hessian is positive definite");
-        let mut solved = 0_u32;
-        let mut steps = 0_u32;
+        let replay = Replay::record(&case, &mut program, solver.as_mut(), STEPS);
         group.bench_function(name, |b| {
-            b.iter(|| {
-                for k in 1500..1600 {
-                    let hold = inputs[(k + HORIZONS.past, 0)];
-                    let reference =
-                        Mat::from_fn(
-                            HORIZONS.future,
-                            2,
-                            |_, i| if i == 0 { hold } else { OFFSET },
-                        );
-                    let zero = Mat::zeros(HORIZONS.future, 1);
-                    let moment = Moment {
-                        past_inputs: inputs.subrows(k, HORIZONS.past),
-                        past_outputs: outputs.subrows(k, HORIZONS.past),
-                        input_reference: reference.as_ref(),
-                        output_reference: zero.as_ref(),
-                    };
-                    let plan = program
-                        .solve(
-                            black_box(&moment),
-                            &mut solver as &mut dyn QpSolver,
-                            &SolveBudget::generous(),
-                        )
-                        .expect("the shapes fit");
-                    assert!(plan.is_usable(), "{:?}", plan.status);
-                    steps += 1;
-                    solved += u32::from(plan.origin == PlanOrigin::Solver);
-                }
-            });
+            b.iter(|| steps(&mut program, solver.as_mut(), &replay, 0..STEPS));
         });
-        println!(
-            "  {name}: the solver ran in {} % of the steps",
-            100 * solved / steps.max(1)
-        );
     }
     group.finish();
 }
 
-criterion_group!(benches, set_up, step);
+/// One step of every formulation and back end: a few samples each, because as written a step
+/// takes seconds. The comparison at equal accuracy is the program `performance`'s.
+fn formulations(criterion: &mut Criterion) {
+    let case = Case::paper(Activity::Some, 0.0);
+    let data = case.data();
+    let (full, reduced) = (case.full_predictor(&data), case.reduced_predictor(&data));
+    let settings = case.settings();
+    let condensed = || CondensedProgram::new(&full, &settings).expect("the settings are valid");
+    let mut program = condensed();
+    let solver = backend::solver(ACTIVE_SET, program.qp(), TOLERANCE);
+    let mut solver = solver.expect("the Hessian is positive definite");
+    let replay = Replay::record(&case, &mut program, solver.as_mut(), STEPS);
+    let written = |predictor| SparseProgram::new(predictor, &settings).expect("they are valid");
+    let programs: [(&str, Box<dyn DeepcProgram>); 3] = [
+        ("condensed", Box::new(condensed())),
+        ("rd", Box::new(written(&reduced))),
+        ("full", Box::new(written(&full))),
+    ];
+    let mut group = criterion.benchmark_group("deepc one step");
+    group.sample_size(10);
+    group.warm_up_time(Duration::from_millis(500));
+    group.measurement_time(Duration::from_secs(2));
+    for (name, mut program) in programs {
+        for backend in backend::available() {
+            let dense = name == "condensed";
+            // The project's own solvers need a dense Hessian; the full form as written takes minutes.
+            let ours = [ACTIVE_SET, ADMM].contains(&backend);
+            if (ours && !dense) || (name == "full" && backend == CLARABEL) {
+                continue;
+            }
+            let solver = backend::solver(backend, program.qp(), 1e-6);
+            let mut solver = solver.expect("the problem is convex");
+            let mut k = 50;
+            group.bench_function(BenchmarkId::new(name, backend), |b| {
+                b.iter(|| {
+                    steps(program.as_mut(), solver.as_mut(), &replay, k..k + 1);
+                    k = if k + 1 < STEPS { k + 1 } else { 50 };
+                });
+            });
+        }
+    }
+    group.finish();
+}
+
+criterion_group!(benches, set_up, condensed, formulations);
 criterion_main!(benches);

@@ -1,1 +1,10 @@
-//! Benchmarks live in this package's `benches/` folder; the package itself is empty.
+//! What the benchmarks share: a plant, the problems posed on it, the moments replayed, and the
+//! back ends that solve them. Everything is deterministic.
+//!
+//! The criterion benches in `benches/` watch single numbers while one works on the code; the
+//! program `performance` measures the comparison in `docs/performance.md`.
+
+pub mod backend;
+pub mod case;
+pub mod plant;
+pub mod replay;

@@ -2,16 +2,13 @@
 //!
 //! `cargo run --release -p deepc-core --example quick_start`
 
-use deepc_core::controller::{
-    DeepcController, Plant, PlantError, RecedingHorizonSettings, run_closed_loop,
-};
+use deepc_core::controller::{DeepcController, Plant, PlantError};
+use deepc_core::controller::{RecedingHorizonSettings, run_closed_loop};
 use deepc_core::data::Dataset;
 use deepc_core::hankel::{HankelMatrix, Horizons};
 use deepc_core::predictor::Predictor;
-use deepc_core::program::{
-    Bounds, CondensedProgram, DeepcProgram, DeepcSettings, OutputBounds, Regularisation, Slack,
-};
-use deepc_core::solver::{ActiveRows, ClarabelSettings, SolveBudget};
+use deepc_core::program::{Bounds, DeepcSettings, OutputBounds, Regularisation, Slack};
+use deepc_core::solver::SolveBudget;
 
 /// Two coupled tanks: pump rates in, levels out. The controller never sees these equations.
 struct Tanks([f64; 2]);
@@ -49,23 +46,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut data = Dataset::new(1.0, ["pump_1", "pump_2"], ["level_1", "level_2"])?;
     data.push_rows(&inputs, &outputs)?;
 
-    // 2. Set up: Hankel matrix, proof of excitation, reduction, program, solver, controller.
+    // 2. Set up: Hankel matrix, proof of excitation, reduction, controller.
     let hankel = HankelMatrix::build(&data, Horizons::new(4, 20))?;
     let exciting = hankel.require_persistently_exciting(4)?;
     let predictor = Predictor::exact(&exciting)?;
+    let (regularisation, slack) = (Regularisation::per_column(1e-6), Slack::Penalty(1e6));
     let settings = DeepcSettings {
-        input_weights: vec![0.01; 2],
-        output_weights: vec![1.0; 2],
-        regularisation: Regularisation::per_column(1e-6),
-        input_slack: Slack::Penalty(1e6),
-        output_slack: Slack::Penalty(1e6),
         input_bounds: vec![Bounds::between(-0.5, 0.5); 2],
         output_bounds: vec![OutputBounds::soft(-0.1, 1.0, 100.0, 10.0); 2],
+        ..DeepcSettings::new(&[0.01; 2], &[1.0; 2], regularisation, slack)
     };
-    let program = CondensedProgram::new(&predictor, &settings)?;
-    let solver = ActiveRows::new(program.qp(), ClarabelSettings::default())?;
     let horizon = RecedingHorizonSettings::every_sample(SolveBudget::generous());
-    let mut controller = DeepcController::new(Box::new(program), Box::new(solver), horizon)?;
+    let mut controller = DeepcController::condensed(&predictor, &settings, horizon)?;
 
     // 3. Control: raise the levels to 0.9 and 0.6.
     let run = run_closed_loop(&mut Tanks([0.0; 2]), &mut controller, 60, |_, reference| {

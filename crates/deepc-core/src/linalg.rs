@@ -44,6 +44,17 @@ pub(crate) fn max_abs(x: &[f64]) -> f64 {
     })
 }
 
+/// Takes the part of `x` within the orthonormal columns `span` away; returns what is left, relative
+/// to what was there or to entries of size 1, whichever is larger; NaN if there was one. `coordinates` has one entry per column.
+pub(crate) fn part_outside(span: MatRef<'_, f64>, x: &mut [f64], coordinates: &mut [f64]) -> f64 {
+    let size = dot(x, x).sqrt();
+    multiply(coordinates, span.transpose(), x);
+    multiply_add(x, span, coordinates, -1.0);
+    let unit = (x.len() as f64).sqrt();
+    // A NaN is not below the unit.
+    dot(x, x).sqrt() / if size < unit { unit } else { size }
+}
+
 /// Rᵀ as a lower triangular matrix with clean zeros, for the upper trapezoidal `r` (k×n, k ≥ n).
 pub(crate) fn lower_from_upper(r: MatRef<'_, f64>) -> Mat<f64> {
     let n = r.ncols();

@@ -6,7 +6,7 @@ use deepc_core::data::{CsvLayout, DataError, Dataset, OutputTiming};
 use deepc_core::hankel::{HankelError, HankelMatrix, Horizons};
 use deepc_core::predictor::Predictor;
 use deepc_core::program::{
-    Bounds, CondensedProgram, DeepcProgram, DeepcSettings, Moment, Normalisation, OutputBounds,
+    Bounds, CondensedProgram, DeepcProgram, DeepcSettings, Moment, OutputBounds, ProgramOptions,
     Regularisation, Slack,
 };
 use faer::{Mat, mat};
@@ -15,6 +15,7 @@ fn layout() -> CsvLayout {
     CsvLayout {
         time: "time_s".into(),
         inputs: vec!["valve".into(), "heater".into()],
+        disturbances: Vec::new(),
         outputs: vec!["level".into(), "temperature".into()],
         outputs_measured: OutputTiming::EndOfInterval,
         sample_time_s: 0.1,
@@ -77,6 +78,7 @@ fn what_is_written_is_read_back_bit_by_bit() {
     let layout = CsvLayout {
         time: "t".into(),
         inputs: vec!["valve".into(), "heater".into()],
+        disturbances: Vec::new(),
         outputs: vec!["level".into()],
         outputs_measured: OutputTiming::EndOfInterval,
         sample_time_s: 0.01,
@@ -258,12 +260,9 @@ fn too_few_samples_are_reported_with_given_and_needed() {
     let inputs = common::gaussian(30, 2, &mut common::rng(1));
     let error = exciting_error(inputs);
     assert!(matches!(
-        error,
-        HankelError::TooFewSamples {
-            given: 30,
-            needed: 38,
-            ..
-        }
+        &error,
+        HankelError::TooFewSamples(report)
+            if (report.samples, report.samples_needed) == (30, 38)
     ));
     says(
         Err::<(), _>(error),
@@ -357,24 +356,22 @@ fn settings() -> DeepcSettings {
     DeepcSettings {
         input_weights: vec![1.0, 1.0],
         output_weights: vec![1.0, 1.0],
-        regularisation: Regularisation {
-            lambda_g: 1.0,
-            normalisation: Normalisation::Raw,
-        },
+        regularisation: Regularisation::raw(1.0),
         input_slack: Slack::Hard,
         output_slack: Slack::Penalty(1e4),
         input_bounds: vec![Bounds::between(-1.0, 1.0); 2],
         output_bounds: vec![OutputBounds::soft(-1.0, 1.0, 1.0, 1.0); 2],
+        options: ProgramOptions::default(),
     }
 }
 
 #[test]
 fn settings_out_of_range_are_reported_by_field() {
-    settings().check(2, 2).unwrap();
+    settings().check(2, 2, 5).unwrap();
     let check = |change: &dyn Fn(&mut DeepcSettings), parts: &[&str]| {
         let mut changed = settings();
         change(&mut changed);
-        says(changed.check(2, 2), parts);
+        says(changed.check(2, 2, 5), parts);
     };
     check(
         &|s| s.input_weights = vec![1.0],
@@ -440,6 +437,7 @@ fn a_moment_of_the_wrong_shape_is_refused_with_its_name() {
         past_outputs: wrong.as_ref(),
         input_reference: future.as_ref(),
         output_reference: future.as_ref(),
+        disturbances: None,
     };
     says(
         program.set_moment(&moment),

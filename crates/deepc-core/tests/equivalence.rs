@@ -2,15 +2,19 @@
 
 mod common;
 
+use common::Solved;
+
 use common::Lti;
 use deepc_core::data::Dataset;
 use deepc_core::hankel::{HankelMatrix, Horizons};
 use deepc_core::predictor::Predictor;
 use deepc_core::program::{
     Bounds, CondensedProgram, DeepcProgram, DeepcSettings, Moment, Normalisation, OutputBounds,
-    Plan, Regularisation, Slack, SparseProgram,
+    ProgramOptions, Regularisation, Slack, SparseProgram,
 };
-use deepc_core::solver::{ActiveRows, ClarabelDirect, ClarabelSettings, QpStatus, SolveBudget};
+use deepc_core::solver::{
+    ActiveSet, ActiveSetSettings, ClarabelSettings, ClarabelSolver, QpStatus, SolveBudget,
+};
 use faer::{Col, Mat};
 
 const PAST: usize = 5;
@@ -20,10 +24,7 @@ fn settings(input_slack: Slack, output_slack: Slack) -> DeepcSettings {
     DeepcSettings {
         input_weights: vec![0.1, 0.3],
         output_weights: vec![2.0, 0.5, 0.0],
-        regularisation: Regularisation {
-            lambda_g: 0.5,
-            normalisation: Normalisation::Raw,
-        },
+        regularisation: Regularisation::raw(0.5),
         input_slack,
         output_slack,
         input_bounds: vec![
@@ -38,6 +39,7 @@ fn settings(input_slack: Slack, output_slack: Slack) -> DeepcSettings {
             OutputBounds::none(),
             OutputBounds::soft(-2.0, 1.5, 0.0, 5.0),
         ],
+        options: ProgramOptions::default(),
     }
 }
 
@@ -76,31 +78,28 @@ impl Situation {
             past_outputs: self.past_outputs.as_ref(),
             input_reference: self.input_reference.as_ref(),
             output_reference: self.output_reference.as_ref(),
+            disturbances: None,
         }
     }
 
-    fn condensed(&self, predictor: &Predictor, settings: &DeepcSettings) -> Plan {
+    fn condensed(&self, predictor: &Predictor, settings: &DeepcSettings) -> Solved {
         let mut program = CondensedProgram::new(predictor, settings).unwrap();
-        let mut solver = ActiveRows::new(program.qp(), ClarabelSettings::default()).unwrap();
+        let mut solver = ActiveSet::new(program.qp(), ActiveSetSettings::default()).unwrap();
         let budget = SolveBudget::generous();
-        program
-            .solve(&self.moment(), &mut solver, &budget)
-            .unwrap()
-            .clone()
+        program.solve(&self.moment(), &mut solver, &budget).unwrap();
+        Solved::of(&program)
     }
 
-    fn sparse(&self, predictor: &Predictor, settings: &DeepcSettings) -> Plan {
+    fn sparse(&self, predictor: &Predictor, settings: &DeepcSettings) -> Solved {
         let mut program = SparseProgram::new(predictor, settings).unwrap();
-        let mut solver = ClarabelDirect::new(program.qp(), ClarabelSettings::default()).unwrap();
+        let mut solver = ClarabelSolver::new(program.qp(), ClarabelSettings::default()).unwrap();
         let budget = SolveBudget::generous();
-        program
-            .solve(&self.moment(), &mut solver, &budget)
-            .unwrap()
-            .clone()
+        program.solve(&self.moment(), &mut solver, &budget).unwrap();
+        Solved::of(&program)
     }
 }
 
-fn check_same(what: &str, a: &Plan, b: &Plan, objective: f64, signals: f64) {
+fn check_same(what: &str, a: &Solved, b: &Solved, objective: f64, signals: f64) {
     assert!(
         a.is_usable() && b.is_usable(),
         "{what}: {:?}, {:?}",
@@ -185,13 +184,13 @@ fn the_parts_of_the_objective_agree_between_the_forms_and_add_up() {
     let programs: [&mut dyn DeepcProgram; 2] = [&mut condensed, &mut sparse];
     for program in programs {
         assert!(program.recover().is_none());
-        let mut solver = ClarabelDirect::new(program.qp(), ClarabelSettings::default()).unwrap();
+        let mut solver = ClarabelSolver::new(program.qp(), ClarabelSettings::default()).unwrap();
         program
             .solve(&situation.moment(), &mut solver, &SolveBudget::generous())
             .unwrap();
         let parts = program.recover().unwrap();
         let total = parts.parts.total();
-        assert!((total - program.plan().objective).abs() <= 1e-9 * total);
+        assert!((total - program.objective().unwrap()).abs() <= 1e-9 * total);
         recovered.push(parts);
     }
     let [a, b] = recovered.try_into().unwrap();
@@ -321,7 +320,7 @@ fn model_based(system: &Lti, situation: &Situation, settings: &DeepcSettings) ->
         upper.push(output.bounds.upper_value() - free[i]);
     }
     let problem = QpProblem::new(QpMatrix::Dense(hessian), QpMatrix::Dense(rows), soft).unwrap();
-    let mut solver = ActiveRows::new(&problem, ClarabelSettings::default()).unwrap();
+    let mut solver = ActiveSet::new(&problem, ActiveSetSettings::default()).unwrap();
     let linear: Vec<f64> = linear.iter().copied().collect();
     let vectors = QpVectors {
         linear: &linear,
@@ -402,10 +401,12 @@ fn multiplying_every_weight_by_a_constant_changes_no_plan() {
         sparse.objective /= c;
         check_same(&format!("{c:e}, sparse"), &sparse, &expected, 1e-7, 1e-5);
         let mut program = CondensedProgram::new(&predictor, &settings).unwrap();
-        let mut direct = ClarabelDirect::new(program.qp(), ClarabelSettings::default()).unwrap();
+        let mut direct = ClarabelSolver::new(program.qp(), ClarabelSettings::default()).unwrap();
         let budget = SolveBudget::generous();
-        let plan = program.solve(&situation.moment(), &mut direct, &budget);
-        let mut direct = plan.unwrap().clone();
+        program
+            .solve(&situation.moment(), &mut direct, &budget)
+            .unwrap();
+        let mut direct = Solved::of(&program);
         direct.objective /= c;
         check_same(&format!("{c:e}, direct"), &direct, &expected, 1e-7, 1e-5);
     }

@@ -6,9 +6,9 @@ use common::Lti;
 use deepc_core::predictor::Predictor;
 use deepc_core::program::{
     Bounds, CondensedProgram, DeepcProgram, DeepcSettings, Moment, OutputBounds, Plan,
-    ProgramError, Regularisation, Slack,
+    ProgramError, ProgramOptions, Regularisation, Slack,
 };
-use deepc_core::solver::{ActiveRows, ClarabelSettings, QpStatus, SolveBudget};
+use deepc_core::solver::{ActiveSet, ActiveSetSettings, QpStatus, SolveBudget};
 use faer::{Col, Mat};
 
 const PAST: usize = 10;
@@ -70,6 +70,7 @@ impl Study {
             output_slack,
             input_bounds: vec![Bounds::between(-0.2, 0.2), Bounds::between(99.5, 100.2)],
             output_bounds: vec![OutputBounds::none(); 3],
+            options: ProgramOptions::default(),
         };
         CondensedProgram::new(&self.predictor, &settings)
     }
@@ -80,18 +81,20 @@ impl Study {
             past_outputs: self.past_outputs.as_ref(),
             input_reference: self.input_reference.as_ref(),
             output_reference: self.output_reference.as_ref(),
+            disturbances: None,
         }
     }
 
     fn plan(&self, lambda_g: f64, input_slack: Slack, output_slack: Slack) -> Plan {
         let mut program = self.program(lambda_g, input_slack, output_slack).unwrap();
-        let mut solver = ActiveRows::new(program.qp(), ClarabelSettings::default()).unwrap();
+        let mut solver = ActiveSet::new(program.qp(), ActiveSetSettings::default()).unwrap();
         let budget = SolveBudget::generous();
         let plan = program.solve(&self.moment(), &mut solver, &budget).unwrap();
         assert_eq!(plan.status, QpStatus::Solved, "{lambda_g:e}");
         let (plan, parts) = (plan.clone(), program.recover().unwrap());
         let total = parts.parts.total();
-        let error = (total - plan.objective).abs() / plan.objective;
+        let objective = program.objective().unwrap();
+        let error = (total - objective).abs() / objective;
         assert!(error <= 1e-6, "{lambda_g:e}: parts {total}, {error:e}");
         for (slack, values) in [
             (input_slack, &parts.input_slack),
@@ -232,9 +235,10 @@ fn the_gain_gives_the_unconstrained_plan() {
         output_slack: Slack::Penalty(1e3),
         input_bounds: vec![Bounds::none(); 2],
         output_bounds: vec![OutputBounds::none(); 3],
+        options: ProgramOptions::default(),
     };
     let mut program = CondensedProgram::new(&study.predictor, &settings).unwrap();
-    let gain = program.gain();
+    let gain = program.reference_gain();
     assert_eq!(gain.shape(), (5 * FUTURE, 5 * FUTURE));
     let mut optimum = |step: Option<usize>| -> Col<f64> {
         let mut moment_data = (
@@ -249,6 +253,7 @@ fn the_gain_gives_the_unconstrained_plan() {
         let moment = Moment {
             input_reference: moment_data.0.as_ref(),
             output_reference: moment_data.1.as_ref(),
+            disturbances: None,
             ..study.moment()
         };
         program.set_moment(&moment).unwrap();

@@ -5,10 +5,12 @@ mod common;
 
 use deepc_core::predictor::Predictor;
 use deepc_core::program::{
-    Bounds, CondensedProgram, DeepcProgram, DeepcSettings, Moment, Normalisation, OutputBounds,
-    PlanOrigin, Regularisation, Slack,
+    Bounds, CondensedProgram, DeepcProgram, DeepcSettings, Moment, OutputBounds, PlanOrigin,
+    ProgramOptions, Regularisation, Slack,
 };
-use deepc_core::solver::{ActiveRows, ClarabelDirect, ClarabelSettings, QpSolver, SolveBudget};
+use deepc_core::solver::{
+    ActiveSet, ActiveSetSettings, ClarabelSettings, ClarabelSolver, QpSolver, SolveBudget,
+};
 use faer::prelude::SolveLstsq;
 use faer::{Col, Mat};
 
@@ -26,14 +28,12 @@ fn settings() -> DeepcSettings {
     DeepcSettings {
         input_weights: vec![1.0, 5e-4],
         output_weights: vec![0.3],
-        regularisation: Regularisation {
-            lambda_g: 100.0,
-            normalisation: Normalisation::Raw,
-        },
+        regularisation: Regularisation::raw(100.0),
         input_slack: Slack::Penalty(1e8),
         output_slack: Slack::Penalty(1e8),
         input_bounds: vec![Bounds::none(), Bounds::none()],
         output_bounds: vec![OutputBounds::none()],
+        options: ProgramOptions::default(),
     }
 }
 
@@ -63,6 +63,7 @@ impl Situation {
             past_outputs: self.past_outputs.as_ref(),
             input_reference: self.input_reference.as_ref(),
             output_reference: self.output_reference.as_ref(),
+            disturbances: None,
         }
     }
 }
@@ -133,7 +134,7 @@ fn the_unconstrained_optimum_is_that_of_an_independent_least_squares_solution() 
         program.set_moment(&situation.moment()).unwrap();
         assert!(program.plan_unconstrained());
         let plan = program.plan();
-        let gap = (plan.objective - objective).abs() / objective;
+        let gap = (program.objective().unwrap() - objective).abs() / objective;
         let distance = common::largest_difference(&plan.inputs, &inputs);
         println!("objective {objective:.6}, gap {gap:.1e}, inputs {distance:.1e}");
         assert!(gap <= 1e-9, "objective gap {gap:e}");
@@ -149,11 +150,11 @@ fn recovered_g_and_slacks_satisfy_the_equations_and_add_up_to_the_objective() {
     program.set_moment(&situation.moment()).unwrap();
     assert!(program.plan_unconstrained());
     let recovered = program.recover().unwrap();
-    let gap = (recovered.parts.total() - program.plan().objective).abs();
-    assert!(gap <= 1e-9 * program.plan().objective, "{gap:e}");
+    let gap = (recovered.parts.total() - program.objective().unwrap()).abs();
+    assert!(gap <= 1e-9 * program.objective().unwrap(), "{gap:e}");
     let g = Col::from_fn(recovered.g.len(), |i| recovered.g[i]);
-    let future = predictor.future_inputs() * &g;
-    let past = predictor.past_outputs() * &g;
+    let future = predictor.blocks().future_inputs * &g;
+    let past = predictor.blocks().past_outputs * &g;
     for k in 0..100 {
         for i in 0..2 {
             let difference = future[2 * k + i] - program.plan().inputs[(k, i)];
@@ -171,8 +172,8 @@ fn bounded_steps_are_certified_and_agree_between_solvers() {
     settings.input_bounds = vec![Bounds::between(-40.0, 40.0), Bounds::between(90.0, 110.0)];
     settings.output_bounds = vec![OutputBounds::soft(-0.6, 0.6, 1e4, 1e4)];
     let mut program = CondensedProgram::new(&predictor, &settings).unwrap();
-    let mut active = ActiveRows::new(program.qp(), ClarabelSettings::default()).unwrap();
-    let mut direct = ClarabelDirect::new(program.qp(), ClarabelSettings::default()).unwrap();
+    let mut active = ActiveSet::new(program.qp(), ActiveSetSettings::default()).unwrap();
+    let mut direct = ClarabelSolver::new(program.qp(), ClarabelSettings::default()).unwrap();
     let mut solved = 0;
     for start in (0..600).step_by(25) {
         let situation = Situation::at(start);
@@ -181,6 +182,7 @@ fn bounded_steps_are_certified_and_agree_between_solvers() {
             .solve(&situation.moment(), &mut active, &budget)
             .unwrap()
             .clone();
+        let objective = program.objective();
         assert!(plan.is_usable(), "{start}: {:?}", plan.status);
         if plan.origin == PlanOrigin::Unconstrained {
             continue;
@@ -193,7 +195,8 @@ fn bounded_steps_are_certified_and_agree_between_solvers() {
             let other = direct.solve(&budget);
             assert!(other.status.is_usable());
             program.accept(other);
-            let gap = (plan.objective - program.plan().objective).abs() / plan.objective;
+            let objective = objective.unwrap();
+            let gap = (objective - program.objective().unwrap()).abs() / objective;
             let distance = common::largest_difference(&plan.inputs, &program.plan().inputs);
             println!("{start}: gap {gap:.1e}, inputs {distance:.1e}");
             assert!(gap <= 1e-7, "{start}: {gap:e}");

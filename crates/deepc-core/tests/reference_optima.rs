@@ -2,16 +2,20 @@
 
 mod common;
 
+use common::Solved;
+
 use std::path::PathBuf;
 
 use deepc_core::data::Dataset;
 use deepc_core::hankel::{HankelMatrix, Horizons};
 use deepc_core::predictor::Predictor;
 use deepc_core::program::{
-    Bounds, CondensedProgram, DeepcProgram, DeepcSettings, Moment, Normalisation, OutputBounds,
-    Plan, Regularisation, Slack, SparseProgram,
+    Bounds, CondensedProgram, DeepcProgram, DeepcSettings, Moment, OutputBounds, ProgramOptions,
+    Regularisation, Slack, SparseProgram,
 };
-use deepc_core::solver::{ActiveRows, ClarabelDirect, ClarabelSettings, QpSolver, SolveBudget};
+use deepc_core::solver::{
+    ActiveSet, ActiveSetSettings, ClarabelSettings, ClarabelSolver, QpSolver, SolveBudget,
+};
 use faer::Mat;
 use serde::Deserialize;
 
@@ -95,32 +99,31 @@ impl Case {
         DeepcSettings {
             input_weights: vec![e.r; e.m],
             output_weights: vec![e.q; e.p],
-            regularisation: Regularisation {
-                lambda_g: e.lam_g,
-                normalisation: Normalisation::Raw,
-            },
+            regularisation: Regularisation::raw(e.lam_g),
             input_slack: Slack::Hard,
             output_slack: Slack::Penalty(e.lam_y),
             input_bounds: vec![Bounds::between(-e.ub, e.ub); e.m],
             output_bounds: vec![OutputBounds::hard(-e.yb, e.yb); e.p],
+            options: ProgramOptions::default(),
         }
     }
 
-    fn solve(&self, program: &mut dyn DeepcProgram, solver: &mut dyn QpSolver) -> Plan {
+    fn solve(&self, program: &mut dyn DeepcProgram, solver: &mut dyn QpSolver) -> Solved {
         let input_reference = Mat::zeros(self.expected.future, self.expected.m);
         let moment = Moment {
             past_inputs: self.past_inputs.as_ref(),
             past_outputs: self.past_outputs.as_ref(),
             input_reference: input_reference.as_ref(),
             output_reference: self.output_reference.as_ref(),
+            disturbances: None,
         };
         program
             .solve(&moment, solver, &SolveBudget::generous())
-            .unwrap()
-            .clone()
+            .unwrap();
+        Solved::of(program)
     }
 
-    fn check(&self, form: &str, plan: &Plan) {
+    fn check(&self, form: &str, plan: &Solved) {
         let (e, name) = (&self.expected, &self.name);
         assert!(plan.is_usable(), "{name} {form}: {:?}", plan.status);
         let gap = (plan.objective - e.objective).abs() / e.objective;
@@ -159,11 +162,14 @@ fn the_condensed_form_finds_the_reference_optima_with_every_solver() {
     for case in cases() {
         let settings = ClarabelSettings::default();
         let mut program = CondensedProgram::new(&case.predictor(), &case.settings()).unwrap();
-        let mut direct = ClarabelDirect::new(program.qp(), settings).unwrap();
-        case.check("condensed, direct", &case.solve(&mut program, &mut direct));
-        let mut active = ActiveRows::new(program.qp(), settings).unwrap();
+        let mut direct = ClarabelSolver::new(program.qp(), settings).unwrap();
         case.check(
-            "condensed, active rows",
+            "condensed, clarabel",
+            &case.solve(&mut program, &mut direct),
+        );
+        let mut active = ActiveSet::new(program.qp(), ActiveSetSettings::default()).unwrap();
+        case.check(
+            "condensed, active set",
             &case.solve(&mut program, &mut active),
         );
     }
@@ -173,7 +179,7 @@ fn the_condensed_form_finds_the_reference_optima_with_every_solver() {
 fn the_sparse_form_finds_the_reference_optima() {
     for case in cases() {
         let mut program = SparseProgram::new(&case.predictor(), &case.settings()).unwrap();
-        let mut direct = ClarabelDirect::new(program.qp(), ClarabelSettings::default()).unwrap();
-        case.check("sparse, direct", &case.solve(&mut program, &mut direct));
+        let mut direct = ClarabelSolver::new(program.qp(), ClarabelSettings::default()).unwrap();
+        case.check("sparse, clarabel", &case.solve(&mut program, &mut direct));
     }
 }

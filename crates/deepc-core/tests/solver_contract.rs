@@ -1,11 +1,13 @@
 //! Every back end runs the same contract.
 
-use deepc_core::solver::{ActiveRows, ClarabelDirect, ClarabelSettings, contract};
+use deepc_core::solver::{
+    ActiveSet, ActiveSetSettings, Admm, AdmmSettings, ClarabelSettings, ClarabelSolver, contract,
+};
 
 #[test]
-fn clarabel_on_the_whole_program_keeps_the_solver_contract() {
+fn clarabel_keeps_the_solver_contract() {
     contract::check_qp_solver(&mut |problem| {
-        Ok(Box::new(ClarabelDirect::new(
+        Ok(Box::new(ClarabelSolver::new(
             problem,
             ClarabelSettings::default(),
         )?))
@@ -14,12 +16,31 @@ fn clarabel_on_the_whole_program_keeps_the_solver_contract() {
 }
 
 #[test]
-fn clarabel_on_the_active_rows_keeps_the_solver_contract() {
+fn the_active_set_keeps_the_solver_contract() {
     contract::check_qp_solver(&mut |problem| {
-        Ok(Box::new(ActiveRows::new(
+        Ok(Box::new(ActiveSet::new(
             problem,
-            ClarabelSettings::default(),
+            ActiveSetSettings::default(),
         )?))
+    })
+    .unwrap();
+}
+
+#[test]
+fn admm_keeps_the_solver_contract() {
+    contract::check_qp_solver(&mut |problem| {
+        Ok(Box::new(Admm::new(problem, AdmmSettings::default())?))
+    })
+    .unwrap();
+}
+
+#[cfg(feature = "osqp")]
+#[test]
+fn osqp_keeps_the_solver_contract() {
+    use deepc_core::solver::{OsqpSettings, OsqpSolver};
+
+    contract::check_qp_solver(&mut |problem| {
+        Ok(Box::new(OsqpSolver::new(problem, OsqpSettings::default())?))
     })
     .unwrap();
 }

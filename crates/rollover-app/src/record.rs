@@ -123,6 +123,7 @@ pub fn read(path: &Path, scenario: &Scenario) -> Result<Dataset> {
     let layout = CsvLayout {
         time: TIME_COLUMN.to_owned(),
         inputs: INPUT_COLUMNS.map(str::to_owned).to_vec(),
+        disturbances: Vec::new(),
         outputs: OUTPUT_COLUMNS.map(str::to_owned).to_vec(),
         outputs_measured: OutputTiming::EndOfInterval,
         sample_time_s: scenario.sample_time_s,

@@ -69,19 +69,26 @@ pub enum SolveStatus {
     Unconstrained,
     /// The QP solver's optimum.
     Solved,
+    /// The second solver's optimum: the first one failed.
+    SolvedBySecond,
     /// A later move of the previous solve's plan.
     Plan,
     /// The solve failed: the previous plan, shifted.
     FallbackPlan,
     /// The solve failed and no plan was left: the last input is held.
     FallbackHold,
+    /// The solve failed, plan and hold were used up: the user's own choice.
+    FallbackUser,
 }
 
 impl SolveStatus {
     /// Whether the step fell back because its solve failed.
     #[must_use]
     pub fn is_fallback(self) -> bool {
-        matches!(self, Self::FallbackPlan | Self::FallbackHold)
+        matches!(
+            self,
+            Self::FallbackPlan | Self::FallbackHold | Self::FallbackUser
+        )
     }
 }
 

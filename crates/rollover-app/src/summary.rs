@@ -139,7 +139,7 @@ impl Summary {
             cost: weights.map_or(0.0, |w| rows.iter().map(|r| w.stage_cost(r)).sum()),
             steps: rows.len(),
             unconstrained_steps: count(|s| s == SolveStatus::Unconstrained),
-            solver_steps: count(|s| s == SolveStatus::Solved),
+            solver_steps: count(|s| matches!(s, SolveStatus::Solved | SolveStatus::SolvedBySecond)),
             fallback_steps: count(SolveStatus::is_fallback),
             step_time_us: StepTime::of(rows.iter().map(|r| r.step_time_us)),
         }

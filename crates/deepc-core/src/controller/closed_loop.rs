@@ -6,6 +6,7 @@ use super::error::{ControllerError, PlantError};
 use super::reference::Reference;
 use super::step::Origin;
 use super::{Controller, Plant};
+use crate::data::same_sample_time;
 
 /// A finished closed-loop run.
 #[derive(Debug, Clone)]
@@ -14,11 +15,15 @@ pub struct ClosedLoopRun {
     pub inputs: Mat<f64>,
     /// Outputs measured, steps×p.
     pub outputs: Mat<f64>,
+    /// Disturbances measured, steps×q of the plant.
+    pub disturbances: Mat<f64>,
     /// Where every input came from.
     pub origins: Vec<Origin>,
 }
 
-/// Runs `steps` samples. `set_reference` gets the sample number and the reference to fill.
+/// Runs `steps` samples. `set_reference` gets the sample number and the reference to fill. What
+/// the plant measures of its disturbances goes to a controller that takes them, and only into the
+/// run otherwise.
 ///
 /// # Errors
 /// Plant and controller differ in sizes or sample time, the reference does not fit, or the plant
@@ -37,6 +42,7 @@ where
     let mut run = ClosedLoopRun {
         inputs: Mat::zeros(steps, plant.inputs()),
         outputs: Mat::zeros(steps, plant.outputs()),
+        disturbances: Mat::zeros(steps, plant.disturbances()),
         origins: Vec::with_capacity(steps),
     };
     let mut input = vec![0.0; plant.inputs()];
@@ -47,17 +53,23 @@ where
         input.copy_from_slice(&step.input);
         run.origins.push(step.origin);
         plant.step(&input, &mut output)?;
-        controller.observe(&input, &output);
-        run.inputs
-            .row_mut(k)
-            .iter_mut()
-            .zip(&input)
-            .for_each(|(entry, value)| *entry = *value);
-        run.outputs
-            .row_mut(k)
-            .iter_mut()
-            .zip(&output)
-            .for_each(|(entry, value)| *entry = *value);
+        let measured = plant.measured_disturbances();
+        let taken = if controller.disturbances() > 0 {
+            measured
+        } else {
+            &[]
+        };
+        controller.observe_with_disturbances(&input, taken, &output);
+        for (series, sample) in [
+            (&mut run.inputs, &input[..]),
+            (&mut run.outputs, &output),
+            (&mut run.disturbances, measured),
+        ] {
+            let entries = series.row_mut(k).iter_mut();
+            entries
+                .zip(sample)
+                .for_each(|(entry, value)| *entry = *value);
+        }
     }
     Ok(run)
 }
@@ -66,12 +78,15 @@ fn check_pair(plant: &dyn Plant, controller: &dyn Controller) -> Result<(), Cont
     let (plant_s, controller_s) = (plant.sample_time_s(), controller.sample_time_s());
     if plant.inputs() == controller.inputs()
         && plant.outputs() == controller.outputs()
-        && (plant_s - controller_s).abs() <= 1e-9 * controller_s
+        && [0, plant.disturbances()].contains(&controller.disturbances())
+        && same_sample_time(controller_s, plant_s)
     {
         return Ok(());
     }
     Err(ControllerError::PlantMismatch {
         plant_inputs: plant.inputs(),
+        plant_disturbances: plant.disturbances(),
+        disturbances: controller.disturbances(),
         plant_outputs: plant.outputs(),
         plant_s,
         inputs: controller.inputs(),

@@ -2,90 +2,71 @@
 
 use std::time::Instant;
 
-use serde::{Deserialize, Serialize};
+use faer::Mat;
 
 use super::Controller;
 use super::error::ControllerError;
+use super::fallback::{Fallback, FallbackContext};
+use super::planner::Planner;
 use super::reference::Reference;
+use super::samples::{Sample, Samples};
+use super::settings::RecedingHorizonSettings;
+use super::statistics::StepStatistics;
 use super::step::{Fault, Origin, Step};
-use super::window::Window;
-use crate::program::{DeepcProgram, Moment, PlanOrigin};
-use crate::solver::{QpSolver, SolveBudget};
-
-/// Settings of the receding horizon.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct RecedingHorizonSettings {
-    /// Moves applied from one plan before the next is made, 1 to N.
-    pub moves_per_solve: usize,
-    /// What one solve may cost.
-    pub budget: SolveBudget,
-}
-
-impl RecedingHorizonSettings {
-    /// A new plan in every sample.
-    #[must_use]
-    pub fn every_sample(budget: SolveBudget) -> Self {
-        Self {
-            moves_per_solve: 1,
-            budget,
-        }
-    }
-
-    /// Checks the ranges, for a horizon of N steps.
-    ///
-    /// # Errors
-    /// Names the field out of range.
-    pub fn check(&self, horizon: usize) -> Result<(), ControllerError> {
-        if !(1..=horizon).contains(&self.moves_per_solve) {
-            return Err(ControllerError::MovesPerSolve {
-                found: self.moves_per_solve,
-                horizon,
-            });
-        }
-        if !self.budget.is_valid() {
-            return Err(ControllerError::Budget {
-                iterations: self.budget.max_iterations,
-                time_s: self.budget.max_time_s,
-            });
-        }
-        Ok(())
-    }
-}
+use crate::hankel::Shape;
+use crate::predictor::Predictor;
+use crate::program::{Bounds, DeepcProgram, DeepcSettings, MeasuredDisturbances, Moment};
+use crate::solver::QpSolver;
 
 /// `DeePC` in closed loop: past window → program vectors → unconstrained optimum or solver →
 /// step.
 ///
 /// | situation | input |
 /// |---|---|
-/// | past window not full | reference input, clipped |
+/// | past window not full for the first time yet | reference input |
 /// | unconstrained optimum meets all bounds | its first move; no solver runs |
 /// | otherwise | first move of the solver's plan |
 /// | between solves (`moves_per_solve` > 1) | next move of the plan |
-/// | solve failed, sample NaN or lost, bad reference | next move of the last plan, and after its end the input applied last |
+/// | solver failed | first move of the second solver's plan, if there is one |
+/// | solve failed or discarded as late, sample NaN or lost, past window refilling after that, bad reference | as [`FallbackPolicy`](super::FallbackPolicy) says: next move of the last plan, the input applied last, or the user's choice |
+///
+/// Whatever it is, it is clipped to the hard bounds of the changes from the input applied last (if
+/// one was) and then to those of the inputs, which win where both cannot be met.
 ///
 /// A sample that is missing is replaced in the past window by what the last plan predicted for
-/// it, and counted in [`Step::repaired_samples`] as long as it stays there. Without a prediction
-/// the window has to fill again.
+/// it (a missing disturbance by the one before), and counted in [`Step::repaired_samples`] as long
+/// as it stays there. Without a prediction, also because another input than the plan's was
+/// decided or applied, the window has to fill again.
 pub struct DeepcController {
-    program: Box<dyn DeepcProgram>,
-    solver: Box<dyn QpSolver>,
+    /// All of one shape and sample time; one acts.
+    planners: Vec<Planner>,
+    active: usize,
     settings: RecedingHorizonSettings,
-    window: Window,
-    /// Samples since the plan was made: the plan's row that belongs to the next sample.
-    plan_age: Option<usize>,
-    /// The input applied last, if `input_applied`.
-    last_input: Vec<f64>,
-    input_applied: bool,
+    samples: Samples,
+    fallback: Fallback,
+    /// The disturbances expected where the reference does not say, N×q.
+    held_disturbances: Mat<f64>,
     /// A decision was made and its sample not observed yet.
     awaits_sample: bool,
-    sample_fault: Option<Fault>,
-    repaired_input: Vec<f64>,
-    repaired_output: Vec<f64>,
+    /// Since it was built or reset.
+    decisions: u64,
+    statistics: StepStatistics,
     step: Step,
 }
 
 impl DeepcController {
+    /// The controller for the control loop: the condensed program and the active-set back end.
+    ///
+    /// # Errors
+    /// A setting is out of range, or data and weights do not make a program.
+    pub fn condensed(
+        predictor: &Predictor,
+        settings: &DeepcSettings,
+        horizon: RecedingHorizonSettings,
+    ) -> Result<Self, ControllerError> {
+        Self::with_planner(Planner::condensed(predictor, settings)?, horizon)
+    }
+
     /// Puts a program and a solver set up with its [`DeepcProgram::qp`] together.
     ///
     /// # Errors
@@ -95,45 +76,93 @@ impl DeepcController {
         solver: Box<dyn QpSolver>,
         settings: RecedingHorizonSettings,
     ) -> Result<Self, ControllerError> {
-        let shape = program.shape();
-        settings.check(shape.horizons.future)?;
-        let (ours, theirs) = (program.qp(), solver.problem());
-        let sizes = (ours.variable_count(), ours.row_count());
-        if sizes != (theirs.variable_count(), theirs.row_count()) {
-            return Err(ControllerError::SolverMismatch {
-                solver_variables: theirs.variable_count(),
-                solver_rows: theirs.row_count(),
-                variables: sizes.0,
-                rows: sizes.1,
-            });
-        }
-        // The optimum for other weights or data would look like a solution of this program.
-        if ours != theirs {
-            return Err(ControllerError::SolverOfOtherProgram {
-                variables: sizes.0,
-                rows: sizes.1,
-            });
-        }
+        Self::with_planner(Planner::new(program, solver)?, settings)
+    }
+
+    /// The same from a program and solvers that were put together before.
+    ///
+    /// # Errors
+    /// A setting is out of range.
+    pub fn with_planner(
+        planner: Planner,
+        settings: RecedingHorizonSettings,
+    ) -> Result<Self, ControllerError> {
+        let shape = planner.program().shape();
+        let steps = shape.horizons.future;
+        settings.check(steps)?;
         Ok(Self {
-            window: Window::new(shape.horizons.past, shape.inputs, shape.outputs),
-            plan_age: None,
-            last_input: vec![0.0; shape.inputs],
-            input_applied: false,
+            samples: Samples::new(shape, settings.frozen_after),
+            fallback: Fallback::new(settings.fallback, shape.inputs),
+            held_disturbances: Mat::zeros(steps, shape.disturbances),
             awaits_sample: false,
-            sample_fault: None,
-            repaired_input: vec![0.0; shape.inputs],
-            repaired_output: vec![0.0; shape.outputs],
-            step: Step::new(shape.horizons.future, shape.inputs, shape.outputs),
-            program,
-            solver,
+            decisions: 0,
+            statistics: StepStatistics::default(),
+            step: Step::new(steps, shape.inputs, shape.outputs),
+            planners: vec![planner],
+            active: 0,
             settings,
         })
+    }
+
+    /// Adds a solver that is asked for the same plan when the first one fails, before the last
+    /// plan is followed. Best one that always costs the same.
+    ///
+    /// # Errors
+    /// It was set up for another program.
+    pub fn with_second_solver(
+        mut self,
+        solver: Box<dyn QpSolver>,
+    ) -> Result<Self, ControllerError> {
+        self.planners[self.active].set_second_solver(solver)?;
+        Ok(self)
+    }
+
+    /// Adds the user's own choice for when plan and hold are used up
+    /// ([`FallbackPolicy`](super::FallbackPolicy)). It finds the input applied last in the slice
+    /// of m values and may change it; what is not finite is replaced by the input applied last, and
+    /// the result is clipped to the hard bounds of the inputs and their changes.
+    ///
+    /// It is asked within [`Controller::decide`]: it should be quick and must not panic. What it
+    /// remembers is its own; [`Controller::reset`] does not reach it.
+    #[must_use]
+    pub fn with_user_fallback(
+        mut self,
+        choose: impl FnMut(&FallbackContext<'_>, &mut [f64]) + Send + 'static,
+    ) -> Self {
+        self.fallback.set_user(Box::new(choose));
+        self
+    }
+
+    /// Takes another program and its solver from the next decision on, as for updated data, and
+    /// returns those that acted so far. The past window and the last plan stay; a second solver
+    /// belongs to its program and leaves with it.
+    ///
+    /// # Errors
+    /// The program has another shape or sample time, or the solver was set up for another one;
+    /// nothing changes then.
+    pub fn switch_program(
+        &mut self,
+        program: Box<dyn DeepcProgram>,
+        solver: Box<dyn QpSolver>,
+    ) -> Result<Planner, ControllerError> {
+        self.switch_planner(Planner::new(program, solver)?)
+    }
+
+    /// [`Self::switch_program`] for a program and solvers that were put together before. Allocates
+    /// nothing.
+    ///
+    /// # Errors
+    /// The program has another shape or sample time; nothing changes then.
+    pub fn switch_planner(&mut self, planner: Planner) -> Result<Planner, ControllerError> {
+        let active = &mut self.planners[self.active];
+        active.check_replacement(&planner)?;
+        Ok(std::mem::replace(active, planner))
     }
 
     /// The program, for its last plan and what it can recover.
     #[must_use]
     pub fn program(&self) -> &dyn DeepcProgram {
-        self.program.as_ref()
+        self.planners[self.active].program()
     }
 
     /// The last decision.
@@ -142,217 +171,280 @@ impl DeepcController {
         &self.step
     }
 
-    fn check_reference(&self, reference: &Reference) -> Option<Fault> {
-        let shape = self.program.shape();
-        let steps = shape.horizons.future;
-        if reference.inputs().shape() != (steps, shape.inputs)
-            || reference.outputs().shape() != (steps, shape.outputs)
-        {
-            return Some(Fault::ReferenceShape);
+    /// Counts and extremes of all steps since the start or the last reset.
+    #[must_use]
+    pub fn statistics(&self) -> &StepStatistics {
+        &self.statistics
+    }
+
+    /// Starts the statistics anew.
+    pub fn reset_statistics(&mut self) {
+        self.statistics.reset();
+    }
+
+    /// Outputs that stand still for longer than `frozen_after` allows.
+    pub fn frozen_outputs(&self) -> impl Iterator<Item = usize> {
+        self.samples.frozen()
+    }
+
+    /// Adds a program that can take over.
+    pub(super) fn add_planner(&mut self, planner: Planner) -> Result<(), ControllerError> {
+        self.planners[self.active].check_replacement(&planner)?;
+        self.planners.push(planner);
+        Ok(())
+    }
+
+    /// Lets another of the programs act; `index` must be below their number.
+    pub(super) fn activate(&mut self, index: usize) {
+        self.active = index;
+    }
+
+    pub(super) fn samples(&self) -> &Samples {
+        &self.samples
+    }
+
+    /// Two decisions without a sample between them: it is lost.
+    pub(super) fn note_lost_sample(&mut self) {
+        if std::mem::take(&mut self.awaits_sample) {
+            let Step { input, plan, .. } = &mut self.step;
+            self.samples.take_lost(input, plan);
         }
-        let finite = reference.inputs().is_all_finite() && reference.outputs().is_all_finite();
-        (!finite).then_some(Fault::ReferenceNotFinite)
+    }
+
+    /// Decides; `start` is when the decision began and `warning` a fault that does not stop it.
+    pub(super) fn decide_from(
+        &mut self,
+        start: Instant,
+        reference: &Reference,
+        warning: Option<Fault>,
+    ) -> &Step {
+        self.note_lost_sample();
+        self.step.clear();
+        self.step.data_set = self.active;
+        let origin = self.choose(start, reference, warning);
+        self.step.count_origin(origin);
+        self.clip_input();
+        self.step.repaired_samples = self.samples.window().repaired_samples();
+        self.awaits_sample = true;
+        self.decisions += 1;
+        self.step.solve_time = start.elapsed();
+        self.step.late = self.is_late(start);
+        self.statistics.record(&self.step);
+        &self.step
+    }
+
+    fn shape(&self) -> Shape {
+        self.program().shape()
+    }
+
+    fn is_late(&self, start: Instant) -> bool {
+        let deadline_s = self.settings.deadline_s.unwrap_or(f64::INFINITY);
+        start.elapsed().as_secs_f64() > deadline_s
+    }
+
+    /// The gravest fault known before any plan is made.
+    fn find_fault(&mut self, reference: &Reference, warning: Option<Fault>) -> Option<Fault> {
+        let sample = self.samples.take_fault();
+        let reference = if !reference.fits(&self.shape()) {
+            Some(Fault::ReferenceShape)
+        } else if !reference.is_finite() {
+            Some(Fault::ReferenceNotFinite)
+        } else {
+            None
+        };
+        let refilling = self.samples.is_refilling();
+        let window = refilling.then_some(Fault::WindowRefilling);
+        let mut faults = [sample, reference, window, warning].into_iter().flatten();
+        let first = faults.clone().next();
+        faults.find(|fault| fault.stops_planning()).or(first)
+    }
+
+    /// Clips the input to the bounds of its change from the one applied last, then to its own.
+    fn clip_input(&mut self) {
+        let settings = self.planners[self.active].program().settings();
+        if let Some(last) = self.samples.input() {
+            let changes = settings.options.input_change_bounds.iter().zip(last);
+            for (value, (change, last)) in self.step.input.iter_mut().zip(changes) {
+                *value = within_reach(change, *last).clip(*value);
+            }
+        }
+        for (value, bounds) in self.step.input.iter_mut().zip(&settings.input_bounds) {
+            *value = bounds.clip(*value);
+        }
     }
 
     /// Chooses the input; the caller clips it.
-    fn choose(&mut self, reference: &Reference) -> Origin {
-        let reference_fault = self.check_reference(reference);
-        let sample_fault = self.sample_fault.take();
-        self.step.fault = sample_fault.or(reference_fault);
-        if let Some(age) = self.plan_age
+    fn choose(&mut self, start: Instant, reference: &Reference, warning: Option<Fault>) -> Origin {
+        self.step.fault = self.find_fault(reference, warning);
+        if let Some(age) = self.step.plan.row()
             && age > 0
             && age < self.settings.moves_per_solve
         {
             self.take_planned(age);
             return Origin::Plan;
         }
-        if self.step.fault.is_some() {
-            return self.fall_back();
+        if self.step.fault.is_some_and(Fault::stops_planning) {
+            return self.fall_back(reference);
         }
-        if !self.window.is_full() {
-            let first = reference.inputs().row(0);
-            self.step
-                .input
-                .iter_mut()
-                .zip(first.iter())
-                .for_each(|(u, r)| *u = *r);
+        // Only before the window is full for the first time: later it is refilling, a fault.
+        if !self.samples.window().is_full() {
+            self.fallback.rearm();
+            let first = reference.inputs().row(0).iter();
+            let input = self.step.input.iter_mut();
+            input.zip(first).for_each(|(u, r)| *u = *r);
             return Origin::Passthrough;
         }
+        let planned = self.plan(reference);
+        match planned {
+            Some(origin) if !(self.settings.discard_late && self.is_late(start)) => {
+                if origin == Origin::SecondSolver {
+                    self.step.fault = Some(Fault::SolveFailed);
+                }
+                self.adopt_plan();
+                origin
+            }
+            Some(_) => {
+                self.step.fault = Some(Fault::DeadlineMissed);
+                self.fall_back(reference)
+            }
+            None => {
+                self.step.fault = Some(Fault::SolveFailed);
+                self.fall_back(reference)
+            }
+        }
+    }
+
+    /// Makes a new plan from a full window.
+    fn plan(&mut self, reference: &Reference) -> Option<Origin> {
+        let window = self.samples.window();
+        let preview = reference.disturbances();
+        if preview.is_none() {
+            for (channel, &value) in self.samples.disturbance().iter().enumerate() {
+                self.held_disturbances.col_mut(channel).fill(value);
+            }
+        }
+        let measured = MeasuredDisturbances {
+            past: window.disturbances(),
+            preview: preview.unwrap_or(self.held_disturbances.as_ref()),
+        };
         let moment = Moment {
-            past_inputs: self.window.inputs(),
-            past_outputs: self.window.outputs(),
+            past_inputs: window.inputs(),
+            past_outputs: window.outputs(),
             input_reference: reference.inputs(),
             output_reference: reference.outputs(),
+            disturbances: (self.held_disturbances.ncols() > 0).then_some(measured),
         };
-        let solved = self
-            .program
-            .solve(&moment, self.solver.as_mut(), &self.settings.budget);
-        if let Ok(plan) = solved {
-            self.step.status = plan.status;
-            self.step.iterations = plan.iterations;
-            if plan.is_usable() {
-                self.step.residual = plan.residual;
-                self.step.objective = Some(plan.objective);
-                let origin = match plan.origin {
-                    PlanOrigin::Unconstrained => Origin::Unconstrained,
-                    PlanOrigin::Solver => Origin::Solver,
-                };
-                self.plan_age = Some(0);
-                self.take_planned(0);
-                return origin;
-            }
-        }
-        self.step.fault = Some(Fault::SolveFailed);
-        self.fall_back()
+        let budget = &self.settings.budget;
+        let second_budget = self.settings.fallback.second_solver_budget;
+        self.planners[self.active].plan(
+            &moment,
+            budget,
+            second_budget.as_ref().unwrap_or(budget),
+            &mut self.step,
+        )
     }
 
-    fn fall_back(&mut self) -> Origin {
-        match self.plan_age {
-            Some(age) if age < self.program.shape().horizons.future => {
-                self.take_planned(age);
-                Origin::Fallback
-            }
-            _ => {
-                // Before any sample there is nothing to hold but the input of the last step,
-                // which is zero at the start.
-                if self.input_applied {
-                    self.step.input.copy_from_slice(&self.last_input);
-                }
-                Origin::Hold
-            }
-        }
+    /// Keeps the program's plan and takes its first move.
+    fn adopt_plan(&mut self) {
+        let program = self.planners[self.active].program();
+        let plan = program.plan();
+        self.step.residual = plan.residual;
+        self.step.tracking = Some(plan.tracking);
+        self.step.plan.adopt(plan, &program.settings().input_bounds);
+        self.fallback.rearm();
+        self.take_planned(0);
     }
 
-    /// Takes row `age` of the last plan, and what remains of the plan as the prediction.
-    fn take_planned(&mut self, age: usize) {
-        let plan = self.program.plan();
-        let rows = plan.inputs.nrows() - age;
+    fn fall_back(&mut self, reference: &Reference) -> Origin {
+        if let Some(row) = self.fallback.plan_row(&self.step) {
+            self.take_planned(row);
+            return Origin::Fallback;
+        }
+        self.fallback
+            .without_plan(self.decisions, &self.samples, reference, &mut self.step)
+    }
+
+    /// Takes a row of the last plan, and what remains of the plan as the prediction.
+    fn take_planned(&mut self, row: usize) {
         let step = &mut self.step;
-        step.predicted_rows = rows;
-        let (inputs, outputs) = (
-            plan.inputs.subrows(age, rows),
-            plan.outputs.subrows(age, rows),
-        );
-        step.predicted_inputs
-            .as_mut()
-            .subrows_mut(0, rows)
-            .copy_from(inputs);
-        step.predicted_outputs
-            .as_mut()
-            .subrows_mut(0, rows)
-            .copy_from(outputs);
-        step.input
-            .iter_mut()
-            .zip(inputs.row(0).iter())
-            .for_each(|(u, planned)| *u = *planned);
-        let bounds = &self.program.settings().output_bounds;
-        step.predicted_violation = bounds
+        step.plan_row = Some(row);
+        step.constraint_violation = step.plan.constraint_violation;
+        let planned = step.plan.inputs.row(row).iter();
+        let input = step.input.iter_mut();
+        input.zip(planned).for_each(|(u, planned)| *u = *planned);
+        let outputs = step.predicted_outputs();
+        let bounds = &self.planners[self.active]
+            .program()
+            .settings()
+            .output_bounds;
+        let violations = bounds
             .iter()
-            .enumerate()
-            .flat_map(|(channel, output)| {
-                outputs
-                    .col(channel)
-                    .iter()
-                    .map(|&value| output.bounds.violation(value))
-            })
-            .fold(0.0, f64::max);
-    }
-
-    /// Appends a sample; entries that are not finite are replaced by the plan's prediction.
-    fn take_sample(&mut self, input: &[f64], output: &[f64], fault: Option<Fault>) {
-        let decided = std::mem::take(&mut self.awaits_sample);
-        let predicted = self
-            .plan_age
-            .filter(|&age| age < self.program.shape().horizons.future);
-        self.plan_age = self.plan_age.map(|age| age + 1);
-        let finite = |values: &[f64]| values.iter().all(|value| value.is_finite());
-        // What was applied: as reported where that can be trusted, else as decided.
-        let reported = input.len() == self.last_input.len() && finite(input);
-        if reported || decided {
-            repair(&mut self.repaired_input, input, self.step.input.iter());
-            self.last_input.copy_from_slice(&self.repaired_input);
-            self.input_applied = true;
-        }
-        if fault.is_none() && finite(input) && finite(output) {
-            self.window.push(input, output, false);
-            self.sample_fault = None;
-            return;
-        }
-        self.sample_fault = Some(fault.unwrap_or(Fault::MeasurementNotFinite));
-        let Some(row) = predicted else {
-            self.window.clear();
-            return;
-        };
-        let plan = self.program.plan();
-        repair(
-            &mut self.repaired_output,
-            output,
-            plan.outputs.row(row).iter(),
-        );
-        self.window
-            .push(&self.repaired_input, &self.repaired_output, true);
+            .zip(outputs.col_iter())
+            .flat_map(|(output, y)| {
+                let bounds: Bounds = output.bounds;
+                y.iter().map(move |&value| bounds.violation(value))
+            });
+        step.predicted_violation = violations.fold(0.0, f64::max);
     }
 }
 
-/// Copies the finite entries of `sample` and takes the others from `substitute`. A sample of the
-/// wrong length has no entry that can be trusted.
-fn repair<'a>(target: &mut [f64], sample: &[f64], substitute: impl Iterator<Item = &'a f64>) {
-    let trusted = sample.len() == target.len();
-    for (i, (entry, substitute)) in target.iter_mut().zip(substitute).enumerate() {
-        *entry = if trusted && sample[i].is_finite() {
-            sample[i]
-        } else {
-            *substitute
-        };
+/// Where an input may go that was `last` before. An end beyond the largest number is that number, so
+/// that what is clipped stays finite.
+fn within_reach(change: &Bounds, last: f64) -> Bounds {
+    let end = |change: f64| (last + change).clamp(f64::MIN, f64::MAX);
+    Bounds {
+        lower: change.lower.map(end),
+        upper: change.upper.map(end),
     }
 }
 
 impl Controller for DeepcController {
     fn inputs(&self) -> usize {
-        self.program.shape().inputs
+        self.shape().inputs
     }
 
     fn outputs(&self) -> usize {
-        self.program.shape().outputs
+        self.shape().outputs
+    }
+
+    fn disturbances(&self) -> usize {
+        self.shape().disturbances
     }
 
     fn horizon(&self) -> usize {
-        self.program.shape().horizons.future
+        self.shape().horizons.future
     }
 
     fn sample_time_s(&self) -> f64 {
-        self.program.sample_time_s()
+        self.program().sample_time_s()
     }
 
     fn decide(&mut self, reference: &Reference) -> &Step {
-        let start = Instant::now();
-        if self.awaits_sample {
-            self.take_sample(&[], &[], Some(Fault::MeasurementLost));
-        }
-        self.step.clear();
-        self.step.origin = self.choose(reference);
-        let bounds = &self.program.settings().input_bounds;
-        for (value, bounds) in self.step.input.iter_mut().zip(bounds) {
-            *value = bounds.clip(*value);
-        }
-        self.step.repaired_samples = self.window.repaired_samples();
-        self.awaits_sample = true;
-        self.step.solve_time = start.elapsed();
-        &self.step
+        self.decide_from(Instant::now(), reference, None)
     }
 
     fn observe(&mut self, input: &[f64], output: &[f64]) {
-        let fits = input.len() == self.inputs() && output.len() == self.outputs();
-        self.take_sample(input, output, (!fits).then_some(Fault::MeasurementShape));
+        self.observe_with_disturbances(input, &[], output);
+    }
+
+    fn observe_with_disturbances(&mut self, input: &[f64], disturbance: &[f64], output: &[f64]) {
+        let sample = Sample {
+            input,
+            disturbance,
+            output,
+        };
+        let Step { input, plan, .. } = &mut self.step;
+        let decided = std::mem::take(&mut self.awaits_sample).then_some(&input[..]);
+        self.samples.take(sample, decided, plan);
     }
 
     fn reset(&mut self) {
-        self.window.clear();
-        self.solver.forget();
-        self.plan_age = None;
-        self.input_applied = false;
+        self.samples.clear();
+        self.fallback.rearm();
+        self.planners.iter_mut().for_each(Planner::forget);
         self.awaits_sample = false;
-        self.sample_fault = None;
+        self.decisions = 0;
+        self.statistics.reset();
         self.step.reset();
     }
 }

@@ -2,6 +2,10 @@
 
 use thiserror::Error;
 
+use crate::hankel::Shape;
+use crate::predictor::PredictorError;
+use crate::program::ProgramError;
+
 /// A plant cannot go on.
 #[derive(Debug, Error)]
 pub enum PlantError {
@@ -28,8 +32,11 @@ impl PlantError {
 }
 
 /// A controller or reference cannot be built.
-#[derive(Debug, Clone, PartialEq, Error)]
+#[derive(Debug, Error)]
 pub enum ControllerError {
+    /// The program or its solver cannot be set up.
+    #[error(transparent)]
+    Program(#[from] ProgramError),
     /// The moves applied from one plan.
     #[error("`moves_per_solve` is {found}; give 1 to the horizon of {horizon} steps")]
     MovesPerSolve {
@@ -39,12 +46,71 @@ pub enum ControllerError {
         horizon: usize,
     },
     /// The budget of a solve.
-    #[error("`budget` is {iterations} iterations and {time_s} s; give at least 1 and more than 0")]
+    #[error("`{field}` is {iterations} iterations and {time_s} s; give at least 1 and more than 0")]
     Budget {
+        /// `budget` or that of the second solver.
+        field: &'static str,
         /// Iterations.
         iterations: u32,
         /// Seconds.
         time_s: f64,
+    },
+    /// The deadline.
+    #[error("`deadline_s` is {found} s; give a finite time above 0, or none")]
+    Deadline {
+        /// Seconds found.
+        found: f64,
+    },
+    /// Late plans shall be discarded, but nothing is ever late.
+    #[error("`discard_late` is set without `deadline_s`: give the time after which a plan is late")]
+    NoDeadline,
+    /// The watch for frozen sensors.
+    #[error("`frozen_after` is 0 samples; give at least 1, or none to watch for nothing")]
+    FrozenAfter,
+    /// A program cannot take over from another in a running controller.
+    #[error(
+        "the new program has {} inputs, {} measured disturbances, {} outputs and horizons of {} \
+         and {} samples, the running one {}, {}, {}, {} and {}: only programs of one shape can \
+         take over from each other",
+        found.inputs, found.disturbances, found.outputs,
+        found.horizons.past, found.horizons.future,
+        shape.inputs, shape.disturbances, shape.outputs,
+        shape.horizons.past, shape.horizons.future,
+    )]
+    OtherShape {
+        /// Sizes of the running program.
+        shape: Shape,
+        /// Sizes of the new one.
+        found: Shape,
+    },
+    /// A program for another clock.
+    #[error(
+        "the new program's data have a sample time of {found_s} s, the running one's {expected_s} s"
+    )]
+    OtherSampleTime {
+        /// Of the running program, in seconds.
+        expected_s: f64,
+        /// Of the new one, in seconds.
+        found_s: f64,
+    },
+    /// The ranges of a schedule are not in order.
+    #[error(transparent)]
+    Schedule(PredictorError),
+    /// A schedule has another number of ranges than there are data sets.
+    #[error("the schedule has {ranges} ranges for {data_sets} data sets: give one per range")]
+    Ranges {
+        /// Data sets.
+        data_sets: usize,
+        /// Ranges of the schedule.
+        ranges: usize,
+    },
+    /// The data set a schedule starts with.
+    #[error("`start` is data set {found}; there are {data_sets}, counted from 0")]
+    Start {
+        /// Index found.
+        found: usize,
+        /// Data sets.
+        data_sets: usize,
     },
     /// The solver was set up for another program.
     #[error(
@@ -78,7 +144,7 @@ pub enum ControllerError {
          (rows are time, columns channels)"
     )]
     Reference {
-        /// `input` or `output`.
+        /// `input`, `output` or `disturbance`.
         name: &'static str,
         /// Rows found.
         rows: usize,
@@ -89,10 +155,15 @@ pub enum ControllerError {
     },
     /// The plant and the controller do not belong together.
     #[error(
-        "the plant has {plant_inputs} inputs, {plant_outputs} outputs and a sample time of \
-         {plant_s} s; the controller {inputs}, {outputs} and {controller_s} s"
+        "the plant has {plant_inputs} inputs, {plant_disturbances} measured disturbances, \
+         {plant_outputs} outputs and a sample time of {plant_s} s; the controller {inputs}, \
+         {disturbances}, {outputs} and {controller_s} s"
     )]
     PlantMismatch {
+        /// The disturbances the plant measures.
+        plant_disturbances: usize,
+        /// The disturbances the controller takes.
+        disturbances: usize,
         /// The plant's inputs.
         plant_inputs: usize,
         /// The plant's outputs.

@@ -3,22 +3,41 @@
 use faer::{Mat, MatMut, MatRef};
 
 use super::error::ControllerError;
+use crate::hankel::Shape;
 
-/// References `u_r` (N×m) and `y_r` (N×p) over the horizon; row 0 is the sample being decided.
-/// Filled in place, so that a control loop need not allocate.
+/// References `u_r` (N×m) and `y_r` (N×p) over the horizon, and what is expected of the measured
+/// disturbances (N×q); row 0 is the sample being decided. Filled in place, so that a control loop
+/// need not allocate.
 #[derive(Debug, Clone)]
 pub struct Reference {
     inputs: Mat<f64>,
     outputs: Mat<f64>,
+    disturbances: Mat<f64>,
+    /// Whether `disturbances` was filled.
+    previewed: bool,
 }
 
 impl Reference {
-    /// All zero, for a horizon of N steps.
+    /// All zero, for a horizon of N steps, without preview of disturbances.
     #[must_use]
     pub fn zeros(horizon: usize, inputs: usize, outputs: usize) -> Self {
+        Self::with_disturbances(horizon, inputs, 0, outputs)
+    }
+
+    /// All zero, for a horizon of N steps, with room for a preview of q measured disturbances.
+    /// Until one is given, the last measured values are held.
+    #[must_use]
+    pub fn with_disturbances(
+        horizon: usize,
+        inputs: usize,
+        disturbances: usize,
+        outputs: usize,
+    ) -> Self {
         Self {
             inputs: Mat::zeros(horizon, inputs),
             outputs: Mat::zeros(horizon, outputs),
+            disturbances: Mat::zeros(horizon, disturbances),
+            previewed: false,
         }
     }
 
@@ -49,6 +68,59 @@ impl Reference {
         fill(self.inputs.as_mut(), inputs);
         fill(self.outputs.as_mut(), outputs);
         Ok(())
+    }
+
+    /// Disturbances known in advance, k×q with any k ≥ 1, as in [`Self::preview`]. They stay until
+    /// others are given or [`Self::hold_measured_disturbances`] is called.
+    ///
+    /// # Errors
+    /// The preview has no rows or the wrong number of columns; the reference is unchanged then.
+    pub fn preview_disturbances(
+        &mut self,
+        disturbances: MatRef<'_, f64>,
+    ) -> Result<(), ControllerError> {
+        check("disturbance", self.disturbances.ncols(), disturbances)?;
+        fill(self.disturbances.as_mut(), disturbances);
+        self.previewed = true;
+        Ok(())
+    }
+
+    /// The same disturbances (q) at every step.
+    ///
+    /// # Errors
+    /// The length does not fit; the reference is unchanged then.
+    pub fn hold_disturbances(&mut self, disturbance: &[f64]) -> Result<(), ControllerError> {
+        self.preview_disturbances(MatRef::from_row_major_slice(
+            disturbance,
+            1,
+            disturbance.len(),
+        ))
+    }
+
+    /// Expects the disturbances measured last at every step, as a new reference does.
+    pub fn hold_measured_disturbances(&mut self) {
+        self.previewed = false;
+    }
+
+    /// The preview of the disturbances, N×q; `None` while the last measured ones are held.
+    #[must_use]
+    pub fn disturbances(&self) -> Option<MatRef<'_, f64>> {
+        self.previewed.then(|| self.disturbances.as_ref())
+    }
+
+    /// Whether its shape fits a controller; a preview of disturbances may be missing.
+    pub(super) fn fits(&self, shape: &Shape) -> bool {
+        let steps = shape.horizons.future;
+        let expected = (steps, shape.disturbances);
+        self.inputs.shape() == (steps, shape.inputs)
+            && self.outputs.shape() == (steps, shape.outputs)
+            && self.disturbances().is_none_or(|d| d.shape() == expected)
+    }
+
+    pub(super) fn is_finite(&self) -> bool {
+        self.inputs.is_all_finite()
+            && self.outputs.is_all_finite()
+            && self.disturbances().is_none_or(|d| d.is_all_finite())
     }
 
     /// `u_r`, N×m.
@@ -113,5 +185,22 @@ mod tests {
         let message = reference.hold(&[1.0], &[0.0, 0.0]).unwrap_err().to_string();
         assert!(message.contains("input reference is 1×1"), "{message}");
         assert!(message.contains("2 columns"), "{message}");
+    }
+
+    #[test]
+    fn a_preview_of_disturbances_stays_until_it_is_taken_back() {
+        let mut reference = Reference::with_disturbances(3, 1, 2, 1);
+        assert!(reference.disturbances().is_none());
+        reference.hold_disturbances(&[1.0, 2.0]).unwrap();
+        let expected = mat![[1.0, 2.0], [1.0, 2.0], [1.0, 2.0]];
+        assert_eq!(reference.disturbances().unwrap(), expected);
+        let message = reference.hold_disturbances(&[1.0]).unwrap_err().to_string();
+        assert!(
+            message.contains("disturbance reference is 1×1"),
+            "{message}"
+        );
+        assert_eq!(reference.disturbances().unwrap(), expected);
+        reference.hold_measured_disturbances();
+        assert!(reference.disturbances().is_none());
     }
 }

@@ -6,15 +6,17 @@ use faer::{Mat, MatRef};
 #[derive(Debug, Clone)]
 pub(super) struct Window {
     inputs: Mat<f64>,
+    disturbances: Mat<f64>,
     outputs: Mat<f64>,
     repaired: Vec<bool>,
     filled: usize,
 }
 
 impl Window {
-    pub fn new(length: usize, inputs: usize, outputs: usize) -> Self {
+    pub fn new(length: usize, inputs: usize, disturbances: usize, outputs: usize) -> Self {
         Self {
             inputs: Mat::zeros(length, inputs),
+            disturbances: Mat::zeros(length, disturbances),
             outputs: Mat::zeros(length, outputs),
             repaired: vec![false; length],
             filled: 0,
@@ -22,8 +24,12 @@ impl Window {
     }
 
     /// Appends a sample and drops the oldest. Lengths must fit.
-    pub fn push(&mut self, input: &[f64], output: &[f64], repaired: bool) {
-        for (series, sample) in [(&mut self.inputs, input), (&mut self.outputs, output)] {
+    pub fn push(&mut self, input: &[f64], disturbance: &[f64], output: &[f64], repaired: bool) {
+        for (series, sample) in [
+            (&mut self.inputs, input),
+            (&mut self.disturbances, disturbance),
+            (&mut self.outputs, output),
+        ] {
             for (channel, &value) in sample.iter().enumerate() {
                 let column = series.col_as_slice_mut(channel);
                 column.copy_within(1.., 0);
@@ -48,12 +54,23 @@ impl Window {
         self.repaired.fill(false);
     }
 
+    /// What is known of the past inputs: at most `T_ini` rows, the newest last.
     pub fn inputs(&self) -> MatRef<'_, f64> {
-        self.inputs.as_ref()
+        self.known(&self.inputs)
     }
 
+    /// The same of the disturbances.
+    pub fn disturbances(&self) -> MatRef<'_, f64> {
+        self.known(&self.disturbances)
+    }
+
+    /// The same of the outputs.
     pub fn outputs(&self) -> MatRef<'_, f64> {
-        self.outputs.as_ref()
+        self.known(&self.outputs)
+    }
+
+    fn known<'a>(&self, series: &'a Mat<f64>) -> MatRef<'a, f64> {
+        series.subrows(self.repaired.len() - self.filled, self.filled)
     }
 
     pub fn repaired_samples(&self) -> usize {
@@ -69,16 +86,18 @@ mod tests {
 
     #[test]
     fn the_window_holds_the_newest_samples_oldest_first() {
-        let mut window = Window::new(2, 1, 2);
-        window.push(&[1.0], &[10.0, 100.0], false);
+        let mut window = Window::new(2, 1, 1, 2);
+        window.push(&[1.0], &[0.1], &[10.0, 100.0], false);
         assert!(!window.is_full());
-        window.push(&[2.0], &[20.0, 200.0], true);
+        assert_eq!(window.outputs(), mat![[10.0, 100.0]]);
+        window.push(&[2.0], &[0.2], &[20.0, 200.0], true);
         assert!(window.is_full());
-        window.push(&[3.0], &[30.0, 300.0], false);
+        window.push(&[3.0], &[0.3], &[30.0, 300.0], false);
         assert_eq!(window.inputs(), mat![[2.0], [3.0]]);
+        assert_eq!(window.disturbances(), mat![[0.2], [0.3]]);
         assert_eq!(window.outputs(), mat![[20.0, 200.0], [30.0, 300.0]]);
         assert_eq!(window.repaired_samples(), 1);
-        window.push(&[4.0], &[40.0, 400.0], false);
+        window.push(&[4.0], &[0.4], &[40.0, 400.0], false);
         assert_eq!(window.repaired_samples(), 0);
     }
 }

@@ -7,7 +7,7 @@ use std::path::Path;
 use faer::Mat;
 use serde::{Deserialize, Serialize};
 
-use super::dataset::{Dataset, Origin};
+use super::dataset::{Dataset, Origin, Record};
 use super::error::{DataError, SamplePlace};
 
 /// How far a time stamp may stand from the uniform grid `t_0` + k·Ts, as a fraction of Ts.
@@ -25,12 +25,13 @@ pub enum OutputTiming {
     /// At the end of the interval over which the row's inputs were applied.
     EndOfInterval,
     /// When the row's inputs began to be applied, as in most logs that write all they know at one
-    /// instant. The inputs of a row are then paired with the outputs of the next one; the first
-    /// outputs and the last inputs are dropped.
+    /// instant. The inputs and disturbances of a row are then paired with the outputs of the next
+    /// one; the first outputs and the last inputs and disturbances are dropped.
     StartOfInterval,
 }
 
-/// Which columns of a comma-separated file are the time, the inputs and the outputs.
+/// Which columns of a comma-separated file are the time, the inputs, the measured disturbances and
+/// the outputs.
 ///
 /// The file has one header line; it may have further columns, and its columns may stand in
 /// any order. Time stamps are in seconds and must lie on `t_0` + k·Ts to within 1 % of Ts.
@@ -41,6 +42,9 @@ pub struct CsvLayout {
     pub time: String,
     /// Names of the input columns; they become the input channels, in this order.
     pub inputs: Vec<String>,
+    /// Names of the columns of measured disturbances, in this order; none if left out.
+    #[serde(default)]
+    pub disturbances: Vec<String>,
     /// Names of the output columns; they become the output channels, in this order.
     pub outputs: Vec<String>,
     /// When the outputs of a row were measured.
@@ -56,7 +60,12 @@ impl Dataset {
     /// A file cannot be read, lacks a named column, names one twice, holds something that is
     /// not a finite number in one, has no samples, or its time stamps are not uniform.
     pub fn read_csv<P: AsRef<Path>>(layout: &CsvLayout, files: &[P]) -> Result<Self, DataError> {
-        let mut data = Self::new(layout.sample_time_s, &layout.inputs, &layout.outputs)?;
+        let mut data = Self::with_disturbances(
+            layout.sample_time_s,
+            &layout.inputs,
+            &layout.disturbances,
+            &layout.outputs,
+        )?;
         for path in files {
             let name = path.as_ref().display().to_string();
             let file = File::open(path).map_err(|source| DataError::Io {
@@ -99,13 +108,14 @@ impl Dataset {
         }
         let column = |wanted: &str| find_column(&header, wanted, name);
         let time = column(time_column)?;
-        let inputs = self.input_names().iter().map(|n| column(n));
-        let inputs = inputs.collect::<Result<Vec<_>, _>>()?;
-        let outputs = self.output_names().iter().map(|n| column(n));
-        let outputs = outputs.collect::<Result<Vec<_>, _>>()?;
+        let columns = |names: &[String]| -> Result<Vec<_>, _> {
+            names.iter().map(|name| column(name)).collect()
+        };
+        let mut inputs = Signals::of(columns(self.input_names())?);
+        let mut disturbances = Signals::of(columns(self.disturbance_names())?);
+        let mut outputs = Signals::of(columns(self.output_names())?);
 
         let mut lines = Vec::new();
-        let (mut input_values, mut output_values) = (Vec::new(), Vec::new());
         let mut clock = Clock::new(self.sample_time_s(), self.records().len() + 1);
         let mut row = csv::StringRecord::new();
         while reader.read_record(&mut row).map_err(broken)? {
@@ -120,28 +130,27 @@ impl Dataset {
                 })
             };
             clock.check(number(time)?, line, name, time_column)?;
-            for &index in &inputs {
-                input_values.push(number(index)?);
-            }
-            for &index in &outputs {
-                output_values.push(number(index)?);
+            for signals in [&mut inputs, &mut disturbances, &mut outputs] {
+                for &index in &signals.columns {
+                    signals.values.push(number(index)?);
+                }
             }
             lines.push(line);
         }
         if lines.is_empty() {
             return Err(DataError::HeaderOnly { file: name.into() });
         }
-        let (m, p) = (self.inputs(), self.outputs());
         let outputs_later = match outputs_measured {
             OutputTiming::EndOfInterval => 0,
             OutputTiming::StartOfInterval => 1,
         };
         let samples = lines.len() - outputs_later;
         self.push_from(
-            Mat::from_fn(samples, m, |k, i| input_values[k * m + i]),
-            Mat::from_fn(samples, p, |k, i| {
-                output_values[(k + outputs_later) * p + i]
-            }),
+            Record {
+                inputs: inputs.series(0, samples),
+                disturbances: disturbances.series(0, samples),
+                outputs: outputs.series(outputs_later, samples),
+            },
             Origin {
                 file: Some(name),
                 lines: Some(&lines),
@@ -192,12 +201,15 @@ impl Dataset {
             source,
         };
         let mut writer = csv::Writer::from_writer(writer);
-        let names = self.input_names().iter().chain(self.output_names());
-        let header = std::iter::once(time_column).chain(names.map(String::as_str));
+        let names = self.input_names().iter();
+        let names = names.chain(self.disturbance_names());
+        let names = names.chain(self.output_names()).map(String::as_str);
+        let header = std::iter::once(time_column).chain(names);
         writer.write_record(header).map_err(broken)?;
         for k in 0..samples.samples() {
             let time = k as f64 * self.sample_time_s();
             let values = samples.inputs().row(k).iter();
+            let values = values.chain(samples.disturbances().row(k).iter());
             let values = values.chain(samples.outputs().row(k).iter());
             let fields = std::iter::once(time).chain(values.copied());
             let fields = fields.map(|value| value.to_string());
@@ -207,6 +219,31 @@ impl Dataset {
             action: "write",
             file: name.into(),
             source,
+        })
+    }
+}
+
+/// Columns of a file that make one series.
+struct Signals {
+    /// Where they stand in the file.
+    columns: Vec<usize>,
+    /// Row after row.
+    values: Vec<f64>,
+}
+
+impl Signals {
+    fn of(columns: Vec<usize>) -> Self {
+        Self {
+            columns,
+            values: Vec::new(),
+        }
+    }
+
+    /// `samples` rows from row `first` on, one column per channel.
+    fn series(&self, first: usize, samples: usize) -> Mat<f64> {
+        let channels = self.columns.len();
+        Mat::from_fn(samples, channels, |k, i| {
+            self.values[(first + k) * channels + i]
         })
     }
 }

@@ -50,7 +50,7 @@ pub enum DataError {
     /// A channel has an empty name.
     #[error("{kind} channel {index} (from 0) has an empty name; give every channel a name")]
     UnnamedChannel {
-        /// `input` or `output`.
+        /// `input`, `disturbance` or `output`.
         kind: &'static str,
         /// Position in the list of names, from 0.
         index: usize,
@@ -87,7 +87,7 @@ pub enum DataError {
     ChannelCount {
         /// Record number, from 1.
         record: usize,
-        /// `input` or `output`.
+        /// `input`, `disturbance` or `output`.
         kind: &'static str,
         /// Channels of the data set.
         expected: usize,
@@ -102,16 +102,16 @@ pub enum DataError {
     RaggedRows {
         /// Record number, from 1.
         record: usize,
-        /// `input` or `output`.
+        /// `input`, `disturbance` or `output`.
         kind: &'static str,
         /// Channels of the data set.
         channels: usize,
         /// Values given.
         values: usize,
     },
-    /// Inputs and outputs of a record differ in length.
+    /// The signals of a record differ in length.
     #[error(
-        "record {record} has {inputs} input samples and {outputs} output samples; \
+        "record {record} has {inputs} input samples and {found} {kind} samples; \
          both must cover the same sample instants"
     )]
     LengthMismatch {
@@ -119,8 +119,10 @@ pub enum DataError {
         record: usize,
         /// Rows of the input matrix.
         inputs: usize,
-        /// Rows of the output matrix.
-        outputs: usize,
+        /// `disturbance` or `output`.
+        kind: &'static str,
+        /// Rows of that matrix.
+        found: usize,
     },
     /// Two data sets do not share one clock.
     #[error("sample times differ: expected {expected} s, found {found} s; resample one of them")]
@@ -136,7 +138,7 @@ pub enum DataError {
          records of one data set have the same channels in the same order"
     )]
     ChannelsDiffer {
-        /// `input` or `output`.
+        /// `input`, `disturbance` or `output`.
         kind: &'static str,
         /// Channels of the data set appended to.
         expected: Vec<String>,

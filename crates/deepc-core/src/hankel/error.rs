@@ -13,6 +13,40 @@ pub enum HankelError {
         /// `past` or `future`.
         name: &'static str,
     },
+    /// A query is not a past window of the data set.
+    #[error("{name} of the query is {rows}×{columns}, expected {expected_rows}×{expected_columns}")]
+    Query {
+        /// Which signal.
+        name: &'static str,
+        /// Its rows.
+        rows: usize,
+        /// Its columns.
+        columns: usize,
+        /// `T_ini`.
+        expected_rows: usize,
+        /// Channels.
+        expected_columns: usize,
+    },
+    /// A query holds NaN or an infinite value.
+    #[error("{name} of the query holds {value} at sample {sample}, channel {channel} (from 0)")]
+    QueryNotFinite {
+        /// Which signal.
+        name: &'static str,
+        /// What was found.
+        value: f64,
+        /// Row.
+        sample: usize,
+        /// Column.
+        channel: usize,
+    },
+    /// More columns were asked for than there are.
+    #[error("{found} columns were asked for; give 1 to {available}")]
+    Columns {
+        /// Number asked for.
+        found: usize,
+        /// Columns of the matrix.
+        available: usize,
+    },
     /// The data set has no record.
     #[error("the data set has no records; push at least one")]
     NoRecords,
@@ -20,7 +54,7 @@ pub enum HankelError {
     #[error(
         "record {record} has {samples} samples, fewer than one window of past + future = {window}; \
          leave it out, shorten the horizons, or record more (persistent excitation needs at least \
-         {needed} samples in one record, and (m + 1) more for each order of the plant)"
+         {needed} samples in one record, and {} more for each order of the plant)", exciting + 1
     )]
     RecordTooShort {
         /// Record number, from 1.
@@ -29,7 +63,9 @@ pub enum HankelError {
         samples: usize,
         /// Window length L.
         window: usize,
-        /// (m + 1)·L − 1, the bound for a plant of order 0.
+        /// Inputs and measured disturbances m + q.
+        exciting: usize,
+        /// (m + q + 1)·L − 1, the bound for a plant of order 0.
         needed: usize,
     },
     /// The singular value decomposition did not converge.
@@ -42,26 +78,9 @@ pub enum HankelError {
         /// Columns.
         columns: usize,
     },
-    /// The samples cannot fill a Hankel matrix of order L + n.
-    #[error(
-        "too few samples: {given} in {records} record(s), needed at least {needed} in one record \
-         for {inputs} input(s), window {window} and plant order {plant_order} \
-         (T ≥ (m+1)(L+n) − 1); record longer or shorten the horizons"
-    )]
-    TooFewSamples {
-        /// Samples given, all records together.
-        given: usize,
-        /// Records.
-        records: usize,
-        /// (m + 1)(L + n) − 1.
-        needed: usize,
-        /// Input channels m.
-        inputs: usize,
-        /// Window L.
-        window: usize,
-        /// Order n assumed of the plant.
-        plant_order: usize,
-    },
+    /// The samples cannot fill a matrix of input windows.
+    #[error("too few samples: {}", .0.shortage())]
+    TooFewSamples(Box<ExcitationReport>),
     /// The inputs do not excite the plant enough.
     #[error("the inputs are not persistently exciting: {}", .0.complaint())]
     NotPersistentlyExciting(Box<ExcitationReport>),

@@ -2,121 +2,77 @@
 
 mod error;
 mod excitation;
+mod factor;
+mod gram;
+mod proof;
 mod rank;
+mod selection;
+mod shape;
 mod stacking;
+mod triangle;
 
 use faer::{Mat, MatRef};
 use serde::{Deserialize, Serialize};
 
 pub use error::HankelError;
-pub use excitation::{ChannelExcitation, ExcitationReport, PersistentlyExciting, SingularValueGap};
+pub use excitation::{ChannelExcitation, ExcitationReport, ExcitingRole, SingularValueGap};
+pub use factor::{FactorMethod, FactorReport, GRAM_CONDITION_LIMIT, HankelFactor};
+pub use proof::{HankelData, PersistentlyExciting};
 pub use rank::RANK_TOLERANCE;
+pub use selection::{PastWindow, Selection};
+pub use shape::{Block, Blocks, Horizons, Shape};
 pub use stacking::{block_hankel, stack, stack_into, stacked_position, unstack_into};
 
 use crate::data::{Dataset, Record};
-use stacking::windows;
+pub(crate) use rank::ChannelScales;
+use stacking::{window_columns, windows};
+pub(crate) use triangle::{BlockQr, Triangle};
 
-/// The two horizons, in samples.
+/// How the columns of a data matrix were taken from the records.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Horizons {
-    /// Past window `T_ini`: long enough to fix the plant's state (at least its lag).
-    pub past: usize,
-    /// Prediction horizon N.
-    pub future: usize,
+#[serde(rename_all = "snake_case")]
+pub enum Arrangement {
+    /// Every window of L samples: neighbouring columns share L − 1 samples.
+    Hankel,
+    /// Windows that follow each other and share no sample (Damen, Van den Hof, Hajdasinski 1982;
+    /// Coulson, Lygeros, Dörfler 2022): independent noise in different columns, as averaging and
+    /// robust formulations assume, for L times the data.
+    Page,
+    /// Some of these columns, selected.
+    Selection,
 }
 
-impl Horizons {
-    /// `past` = `T_ini` and `future` = N samples.
-    #[must_use]
-    pub fn new(past: usize, future: usize) -> Self {
-        Self { past, future }
-    }
-
-    /// Window L = `T_ini` + N.
-    #[must_use]
-    pub fn window(&self) -> usize {
-        self.past.saturating_add(self.future)
-    }
-}
-
-/// Sizes shared by everything built from one Hankel matrix: m inputs, p outputs, horizons.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Shape {
-    /// Input channels m.
-    pub inputs: usize,
-    /// Output channels p.
-    pub outputs: usize,
-    /// Horizons `T_ini` and N.
-    pub horizons: Horizons,
-}
-
-impl Shape {
-    /// Length of the stacked past (`u_ini`, `y_ini`): (m + p)·`T_ini`.
-    #[must_use]
-    pub fn past_rows(&self) -> usize {
-        (self.inputs + self.outputs) * self.horizons.past
-    }
-
-    /// Length of the stacked future (u, y): (m + p)·N.
-    #[must_use]
-    pub fn future_rows(&self) -> usize {
-        (self.inputs + self.outputs) * self.horizons.future
-    }
-
-    /// Rows of the stacked Hankel matrix: (m + p)·L.
-    #[must_use]
-    pub fn rows(&self) -> usize {
-        self.past_rows() + self.future_rows()
-    }
-
-    /// One value per row of the stacked Hankel matrix, from one value per channel.
-    pub(crate) fn per_row<T: Copy>(&self, inputs: &[T], outputs: &[T]) -> Vec<T> {
-        let Horizons { past, future } = self.horizons;
-        let blocks = [
-            (inputs, past),
-            (outputs, past),
-            (inputs, future),
-            (outputs, future),
-        ];
-        blocks
-            .into_iter()
-            .flat_map(|(values, steps)| values.repeat(steps))
-            .collect()
-    }
-
-    /// First row and number of rows of the four blocks `U_p`, `Y_p`, `U_f`, `Y_f`.
-    pub(crate) fn blocks(&self) -> [(usize, usize); 4] {
-        let Horizons { past, future } = self.horizons;
-        let sizes = [
-            self.inputs * past,
-            self.outputs * past,
-            self.inputs * future,
-            self.outputs * future,
-        ];
-        let mut first = 0;
-        sizes.map(|size| {
-            let block = (first, size);
-            first += size;
-            block
-        })
+impl Arrangement {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Hankel => "Hankel",
+            Self::Page => "Page",
+            Self::Selection => "selected data",
+        }
     }
 }
 
 /// The stacked block Hankel matrix H of order L of a data set, one column per window of L
-/// samples, partitioned by name. Its rows are `col(u_ini, y_ini, u, y)`, each stacked
+/// samples, partitioned by name. Its rows are `col(u_ini, d_ini, y_ini, d, u, y)`, each stacked
 /// time-major:
 ///
 /// | block | rows | |
 /// |---|---|---|
 /// | `U_p` | m·`T_ini` | past inputs |
+/// | `D_p` | q·`T_ini` | past measured disturbances |
 /// | `Y_p` | p·`T_ini` | past outputs |
+/// | `D_f` | q·N | future measured disturbances |
 /// | `U_f` | m·N | future inputs |
 /// | `Y_f` | p·N | future outputs |
+///
+/// What is known when the controller decides stands above what it decides.
 #[derive(Debug, Clone)]
 pub struct HankelMatrix {
     dataset: Dataset,
     shape: Shape,
+    arrangement: Arrangement,
+    /// Record (from 0) and first sample of every column.
+    starts: Vec<(usize, usize)>,
     matrix: Mat<f64>,
 }
 
@@ -126,51 +82,35 @@ impl HankelMatrix {
     /// # Errors
     /// A horizon is 0, there is no record, or one is shorter than L.
     pub fn build(dataset: &Dataset, horizons: Horizons) -> Result<Self, HankelError> {
-        for (name, steps) in [("past", horizons.past), ("future", horizons.future)] {
-            if steps == 0 {
-                return Err(HankelError::EmptyHorizon { name });
-            }
-        }
-        if dataset.records().is_empty() {
-            return Err(HankelError::NoRecords);
-        }
-        let window = horizons.window();
-        let (m, p) = (dataset.inputs(), dataset.outputs());
-        for (index, record) in dataset.records().iter().enumerate() {
-            if windows(record.samples(), window) == 0 {
-                return Err(HankelError::RecordTooShort {
-                    record: index + 1,
-                    samples: record.samples(),
-                    window,
-                    needed: (m + 1).saturating_mul(window) - 1,
-                });
-            }
-        }
-        let shape = Shape {
-            inputs: m,
-            outputs: p,
-            horizons,
-        };
-        let inputs: Vec<_> = dataset.records().iter().map(Record::inputs).collect();
-        let outputs: Vec<_> = dataset.records().iter().map(Record::outputs).collect();
-        let (inputs, outputs) = (
-            block_hankel(&inputs, window),
-            block_hankel(&outputs, window),
-        );
-        let mut matrix = Mat::zeros(shape.rows(), inputs.ncols());
-        let (past_u, past_y) = (m * horizons.past, p * horizons.past);
-        let sources = [
-            inputs.subrows(0, past_u),
-            outputs.subrows(0, past_y),
-            inputs.subrows(past_u, m * horizons.future),
-            outputs.subrows(past_y, p * horizons.future),
-        ];
-        for ((first, rows), source) in shape.blocks().into_iter().zip(sources) {
-            matrix.as_mut().subrows_mut(first, rows).copy_from(source);
+        Self::arrange(dataset, horizons, 1, Arrangement::Hankel)
+    }
+
+    /// Builds the Page matrix ([`Arrangement::Page`]) instead: ⌊T/L⌋ columns per record.
+    ///
+    /// # Errors
+    /// As [`HankelMatrix::build`].
+    pub fn build_page(dataset: &Dataset, horizons: Horizons) -> Result<Self, HankelError> {
+        Self::arrange(dataset, horizons, horizons.window(), Arrangement::Page)
+    }
+
+    fn arrange(
+        dataset: &Dataset,
+        horizons: Horizons,
+        stride: usize,
+        arrangement: Arrangement,
+    ) -> Result<Self, HankelError> {
+        let shape = check(dataset, horizons)?;
+        let starts = starts(dataset, horizons.window(), stride);
+        let mut matrix = Mat::zeros(shape.rows(), starts.len());
+        for (column, &(record, start)) in starts.iter().enumerate() {
+            let record = &dataset.records()[record];
+            shape.write_window(record, start, matrix.col_as_slice_mut(column));
         }
         Ok(Self {
             dataset: dataset.clone(),
             shape,
+            arrangement,
+            starts,
             matrix,
         })
     }
@@ -226,57 +166,119 @@ impl HankelMatrix {
         self.matrix.ncols()
     }
 
-    /// The whole matrix H, (m + p)L×J, rows `col(u_ini, y_ini, u, y)`.
+    /// The whole matrix H, (m + q + p)L×J, rows `col(u_ini, d_ini, y_ini, d, u, y)`.
     #[must_use]
     pub fn stacked(&self) -> MatRef<'_, f64> {
         self.matrix.as_ref()
     }
 
-    /// `U_p`, m·`T_ini`×J.
+    /// Its blocks by name, J columns each.
     #[must_use]
-    pub fn past_inputs(&self) -> MatRef<'_, f64> {
-        self.block(0)
+    pub fn blocks(&self) -> Blocks<'_> {
+        Blocks::of(self.stacked(), self.shape)
     }
 
-    /// `Y_p`, p·`T_ini`×J.
+    /// How its columns were taken from the records.
     #[must_use]
-    pub fn past_outputs(&self) -> MatRef<'_, f64> {
-        self.block(1)
+    pub fn arrangement(&self) -> Arrangement {
+        self.arrangement
     }
 
-    /// `U_f`, m·N×J.
+    /// Record number (from 1) and first sample (from 0) of column `column`, if there is one.
     #[must_use]
-    pub fn future_inputs(&self) -> MatRef<'_, f64> {
-        self.block(2)
-    }
-
-    /// `Y_f`, p·N×J.
-    #[must_use]
-    pub fn future_outputs(&self) -> MatRef<'_, f64> {
-        self.block(3)
-    }
-
-    fn block(&self, index: usize) -> MatRef<'_, f64> {
-        let (first, rows) = self.shape.blocks()[index];
-        self.matrix.subrows(first, rows)
+    pub fn origin(&self, column: usize) -> Option<(usize, usize)> {
+        let &(record, start) = self.starts.get(column)?;
+        Some((record + 1, start))
     }
 
     /// H with every channel divided by its scale.
-    pub(crate) fn scaled_rows(&self, inputs: &[f64], outputs: &[f64]) -> Mat<f64> {
-        let scales = self.shape.per_row(inputs, outputs);
+    pub(crate) fn scaled_rows(&self, scales: &ChannelScales) -> Mat<f64> {
+        let scales = scales.per_row(self.shape);
         Mat::from_fn(self.matrix.nrows(), self.matrix.ncols(), |i, j| {
             self.matrix[(i, j)] / scales[i]
         })
     }
 
-    /// Root mean square of every input and output channel (1 for a channel that is zero).
-    pub(crate) fn channel_scales(&self) -> (Vec<f64>, Vec<f64>) {
-        let records = self.dataset.records();
-        let inputs: Vec<_> = records.iter().map(Record::inputs).collect();
-        let outputs: Vec<_> = records.iter().map(Record::outputs).collect();
-        (
-            rank::channel_scales(&inputs),
-            rank::channel_scales(&outputs),
-        )
+    /// Root mean square of every channel.
+    pub(crate) fn channel_scales(&self) -> ChannelScales {
+        ChannelScales::of(&self.dataset)
     }
+}
+
+impl HankelData for HankelMatrix {
+    fn dataset(&self) -> &Dataset {
+        &self.dataset
+    }
+
+    fn shape(&self) -> Shape {
+        self.shape
+    }
+
+    fn arrangement(&self) -> Arrangement {
+        self.arrangement
+    }
+
+    fn scaled_stacked(&self, scales: &ChannelScales) -> Mat<f64> {
+        self.scaled_rows(scales)
+    }
+
+    fn scaled_inputs(&self, channels: &[usize], depth: usize, scales: &[f64]) -> (Mat<f64>, usize) {
+        let series = |record: &Record| {
+            let all = record.channels();
+            Mat::from_fn(record.samples(), channels.len(), |k, i| {
+                all[channels[i]][k] / scales[i]
+            })
+        };
+        let series: Vec<_> = self.dataset.records().iter().map(series).collect();
+        let views: Vec<_> = series.iter().map(Mat::as_ref).collect();
+        let starts = match self.arrangement {
+            Arrangement::Hankel => starts(&self.dataset, depth, 1),
+            Arrangement::Page => starts(&self.dataset, depth, self.horizons().window()),
+            Arrangement::Selection => self.starts.clone(),
+        };
+        let columns = starts.len();
+        (window_columns(&views, depth, &starts), columns)
+    }
+}
+
+/// Sizes, if every record holds a window.
+fn check(dataset: &Dataset, horizons: Horizons) -> Result<Shape, HankelError> {
+    for (name, steps) in [("past", horizons.past), ("future", horizons.future)] {
+        if steps == 0 {
+            return Err(HankelError::EmptyHorizon { name });
+        }
+    }
+    if dataset.records().is_empty() {
+        return Err(HankelError::NoRecords);
+    }
+    let shape = Shape {
+        inputs: dataset.inputs(),
+        disturbances: dataset.disturbances(),
+        outputs: dataset.outputs(),
+        horizons,
+    };
+    let window = horizons.window();
+    for (index, record) in dataset.records().iter().enumerate() {
+        if windows(record.samples(), window) == 0 {
+            let exciting = shape.inputs + shape.disturbances;
+            return Err(HankelError::RecordTooShort {
+                record: index + 1,
+                samples: record.samples(),
+                window,
+                exciting,
+                needed: (exciting + 1).saturating_mul(window) - 1,
+            });
+        }
+    }
+    Ok(shape)
+}
+
+/// Record (from 0) and first sample of every window of `depth` samples, `stride` samples apart.
+fn starts(dataset: &Dataset, depth: usize, stride: usize) -> Vec<(usize, usize)> {
+    let records = dataset.records().iter().enumerate();
+    let starts = records.flat_map(|(index, record)| {
+        let count = windows(record.samples(), depth);
+        (0..count).step_by(stride).map(move |start| (index, start))
+    });
+    starts.collect()
 }

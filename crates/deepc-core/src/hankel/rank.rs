@@ -1,8 +1,10 @@
 //! Numerical rank of wide matrices.
 
-use faer::{Mat, MatRef};
+use faer::MatRef;
 
 use super::error::HankelError;
+use super::shape::Shape;
+use crate::data::{Dataset, Record};
 
 /// A singular value counts towards the rank if it is above this fraction of the largest one
 /// (after every channel was scaled to unit root mean square). Rounding leaves about 1e-14;
@@ -38,16 +40,39 @@ impl Rank {
     }
 }
 
-/// Root mean square of every channel over all series; 1 for a channel that is zero throughout.
-pub(crate) fn channel_scales(series: &[MatRef<'_, f64>]) -> Vec<f64> {
+/// Root mean square of every channel over all records; 1 for a channel that is zero throughout.
+#[derive(Debug, Clone)]
+pub struct ChannelScales {
+    pub inputs: Vec<f64>,
+    pub disturbances: Vec<f64>,
+    pub outputs: Vec<f64>,
+}
+
+impl ChannelScales {
+    pub fn of(data: &Dataset) -> Self {
+        let series = |of: fn(&Record) -> MatRef<'_, f64>| -> Vec<f64> {
+            let all: Vec<_> = data.records().iter().map(of).collect();
+            root_mean_squares(&all)
+        };
+        Self {
+            inputs: series(Record::inputs),
+            disturbances: series(Record::disturbances),
+            outputs: series(Record::outputs),
+        }
+    }
+
+    /// One per row of the stacked Hankel matrix.
+    pub fn per_row(&self, shape: Shape) -> Vec<f64> {
+        shape.per_row(&self.inputs, &self.disturbances, &self.outputs)
+    }
+}
+
+fn root_mean_squares(series: &[MatRef<'_, f64>]) -> Vec<f64> {
     let channels = series.first().map_or(0, |s| s.shape().1);
     let samples: usize = series.iter().map(|s| s.shape().0).sum();
     let scale = |channel: usize| {
-        let energy: f64 = series
-            .iter()
-            .map(|s| s.col(channel).squared_norm_l2())
-            .sum();
-        let rms = (energy / samples as f64).sqrt();
+        let energies = series.iter().map(|s| s.col(channel).squared_norm_l2());
+        let rms = (energies.sum::<f64>() / samples as f64).sqrt();
         if rms > 0.0 && rms.is_finite() {
             rms
         } else {
@@ -55,11 +80,4 @@ pub(crate) fn channel_scales(series: &[MatRef<'_, f64>]) -> Vec<f64> {
         }
     };
     (0..channels).map(scale).collect()
-}
-
-/// Every channel divided by its scale.
-pub(crate) fn scaled(series: MatRef<'_, f64>, scales: &[f64]) -> Mat<f64> {
-    Mat::from_fn(series.nrows(), series.ncols(), |k, i| {
-        series[(k, i)] / scales[i]
-    })
 }

@@ -62,24 +62,26 @@ pub fn unstack_into(stacked: &[f64], mut series: MatMut<'_, f64>) {
 /// J = Σ (Tᵢ − depth + 1) over the series with at least `depth` samples.
 #[must_use]
 pub fn block_hankel(series: &[MatRef<'_, f64>], depth: usize) -> Mat<f64> {
-    let channels = series.first().map_or(0, |s| s.shape().1);
-    let columns = series.iter().map(|s| windows(s.nrows(), depth)).sum();
-    let mut hankel = Mat::zeros(channels * depth, columns);
-    let mut first = 0;
-    for one in series {
+    let starts = series.iter().enumerate().flat_map(|(index, one)| {
         let count = windows(one.nrows(), depth);
-        for start in 0..count {
-            let mut column = hankel.col_mut(first + start);
-            for time in 0..depth {
-                for channel in 0..channels {
-                    column[stacked_position(time, channel, channels)] =
-                        one[(start + time, channel)];
-                }
-            }
-        }
-        first += count;
+        (0..count).map(move |start| (index, start))
+    });
+    window_columns(series, depth, &starts.collect::<Vec<_>>())
+}
+
+/// One column per window of `depth` samples: series number and first sample.
+pub(super) fn window_columns(
+    series: &[MatRef<'_, f64>],
+    depth: usize,
+    starts: &[(usize, usize)],
+) -> Mat<f64> {
+    let channels = series.first().map_or(0, |s| s.shape().1);
+    let mut columns = Mat::zeros(channels * depth, starts.len());
+    for (column, &(index, start)) in starts.iter().enumerate() {
+        let window = series[index].subrows(start, depth);
+        stack_into(window, columns.col_as_slice_mut(column));
     }
-    hankel
+    columns
 }
 
 /// Windows of `depth` samples in a record of `samples` samples.

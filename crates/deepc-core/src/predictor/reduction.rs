@@ -6,6 +6,7 @@ use faer::linalg::solvers::Svd;
 use faer::{Mat, MatRef};
 use serde::{Deserialize, Serialize};
 
+use super::PlantData;
 use super::error::PredictorError;
 use crate::hankel::{HankelMatrix, RANK_TOLERANCE};
 
@@ -15,6 +16,8 @@ use crate::hankel::{HankelMatrix, RANK_TOLERANCE};
 pub enum ReductionMethod {
     /// Not at all.
     None,
+    /// Written in an orthonormal basis of the row space, by a QR decomposition: nothing is gone.
+    Compact,
     /// To the numerical rank.
     Exact,
     /// Below the numerical rank (or to a rank the user chose).
@@ -26,11 +29,12 @@ pub enum ReductionMethod {
 pub struct Reduction {
     /// Method.
     pub method: ReductionMethod,
-    /// Rows (m + p)L.
+    /// Rows (m + q + p)L.
     pub rows: usize,
-    /// Columns J of the Hankel matrix.
+    /// Columns J of the Hankel matrix. If the past is forgotten exponentially, by the factor γ
+    /// from one column to the next, the number of columns that weigh as much, Σγᵏ, rounded.
     pub columns_before: usize,
-    /// Columns q of the reduced matrix.
+    /// Columns c of the reduced matrix.
     pub columns_after: usize,
     /// Share of the squared Frobenius norm of H (in the units of the data) that is gone, 0 to 1.
     pub energy_lost: f64,
@@ -45,17 +49,31 @@ impl Reduction {
         Self::report(ReductionMethod::None, hankel, hankel.stacked(), columns)
     }
 
+    /// For a matrix with the same H Hᵀ.
+    pub(super) fn lossless(plant: &PlantData, before: usize, after: usize) -> Self {
+        Self {
+            method: ReductionMethod::Compact,
+            rows: plant.shape.rows(),
+            columns_before: before,
+            columns_after: after,
+            energy_lost: 0.0,
+            channel_energy_lost: plant.all_names().into_iter().map(|n| (n, 0.0)).collect(),
+        }
+    }
+
     fn report(
         method: ReductionMethod,
         hankel: &HankelMatrix,
         reduced: MatRef<'_, f64>,
         columns_after: usize,
     ) -> Self {
-        let names = hankel.dataset().input_names().iter();
-        let names: Vec<_> = names.chain(hankel.dataset().output_names()).collect();
-        let inputs: Vec<usize> = (0..hankel.shape().inputs).collect();
-        let outputs: Vec<usize> = (inputs.len()..names.len()).collect();
-        let owner = hankel.shape().per_row(&inputs, &outputs);
+        let data = hankel.dataset();
+        let names = data.input_names().iter().chain(data.disturbance_names());
+        let names: Vec<_> = names.chain(data.output_names()).collect();
+        let channels: Vec<usize> = (0..names.len()).collect();
+        let (inputs, others) = channels.split_at(data.inputs());
+        let (disturbances, outputs) = others.split_at(data.disturbances());
+        let owner = hankel.shape().per_row(inputs, disturbances, outputs);
         let mut before = vec![0.0; names.len()];
         let mut after = vec![0.0; names.len()];
         for (row, &channel) in owner.iter().enumerate() {
@@ -86,6 +104,7 @@ impl fmt::Display for Reduction {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let method = match self.method {
             ReductionMethod::None => "not reduced",
+            ReductionMethod::Compact => "in an orthonormal basis of its rows",
             ReductionMethod::Exact => "reduced to its numerical rank",
             ReductionMethod::Truncated => "truncated",
         };
@@ -104,9 +123,9 @@ impl fmt::Display for Reduction {
 /// H̄ = H V₁ with V₁ from the SVD of H with its channels scaled: row scaling leaves the row
 /// space, and with it range(V₁), unchanged, so the rank decision does not depend on units.
 pub(super) fn exact(hankel: &HankelMatrix) -> Result<(Mat<f64>, Reduction), PredictorError> {
-    let (inputs, outputs) = hankel.channel_scales();
-    let scales = hankel.shape().per_row(&inputs, &outputs);
-    let scaled = hankel.scaled_rows(&inputs, &outputs);
+    let channels = hankel.channel_scales();
+    let scales = channels.per_row(hankel.shape());
+    let scaled = hankel.scaled_rows(&channels);
     let svd = left_svd(scaled.as_ref())?;
     let sigma = svd.S().column_vector();
     let limit = RANK_TOLERANCE * sigma.iter().copied().fold(0.0, f64::max);

@@ -1,12 +1,13 @@
-//! What both forms share: the stacked vectors, the weights and the plan.
+//! What both forms share: the stacked vectors, the costs, the constraints and the plan.
 
 use faer::MatRef;
 
-use super::bounds::BoundRows;
 use super::error::ProgramError;
-use super::plan::{Moment, ObjectiveParts, Plan, PlanOrigin};
+use super::plan::{MeasuredDisturbances, Moment, ObjectiveParts, Plan, PlanOrigin};
+use super::rows::ConstraintRows;
 use super::settings::DeepcSettings;
-use crate::hankel::{Shape, stack_into, unstack_into};
+use super::stage_cost::{StageCost, TrackingCost};
+use crate::hankel::{Block, Shape, stack_into, unstack_into};
 use crate::predictor::Predictor;
 use crate::solver::{QpSolution, QpStatus};
 
@@ -15,15 +16,14 @@ pub(super) struct Common {
     pub shape: Shape,
     pub settings: DeepcSettings,
     pub sample_time_s: f64,
-    /// `λ_g` of the raw form.
-    pub lambda_g: f64,
-    /// `1/λ_u` and `1/λ_y`, one per entry of `w_ini`.
+    /// J before any reduction.
+    pub columns: usize,
+    /// 1/λ of the slack of every entry of the known part; 0 where it is hard.
     pub compliance: Vec<f64>,
-    /// Diagonal of blkdiag(R, Q), one per entry of f.
-    pub weights: Vec<f64>,
-    pub bounds: BoundRows,
-    /// `w_ini = col(u_ini, y_ini)`.
-    pub past: Vec<f64>,
+    pub cost: StageCost,
+    pub rows: ConstraintRows,
+    /// `z = col(u_ini, d_ini, y_ini, d)`.
+    pub known: Vec<f64>,
     /// `r = col(u_r, y_r)`.
     pub reference: Vec<f64>,
     pub plan: Plan,
@@ -32,40 +32,54 @@ pub(super) struct Common {
 impl Common {
     pub fn new(predictor: &Predictor, settings: &DeepcSettings) -> Result<Self, ProgramError> {
         let shape = predictor.shape();
-        settings.check(shape.inputs, shape.outputs)?;
-        let [(_, past_u), (_, past_y), ..] = shape.blocks();
-        let mut compliance = vec![settings.input_slack.compliance(); past_u];
-        compliance.resize(past_u + past_y, settings.output_slack.compliance());
-        let steps = shape.horizons.future;
-        let mut weights = settings.input_weights.repeat(steps);
-        weights.extend(settings.output_weights.repeat(steps));
-        let columns = predictor.reduction().columns_before;
+        let horizons = shape.horizons;
+        settings.check(shape.inputs, shape.outputs, horizons.future)?;
+        let disturbance = settings.options.disturbance_slack.0.compliance();
+        let mut compliance = Vec::with_capacity(shape.known_rows());
+        for (value, channels, steps) in [
+            (
+                settings.input_slack.compliance(),
+                shape.inputs,
+                horizons.past,
+            ),
+            (disturbance, shape.disturbances, horizons.past),
+            (
+                settings.output_slack.compliance(),
+                shape.outputs,
+                horizons.past,
+            ),
+            (disturbance, shape.disturbances, horizons.future),
+        ] {
+            compliance.resize(compliance.len() + channels * steps, value);
+        }
+        let future_scales = &predictor.row_scales()[shape.known_rows()..];
         Ok(Self {
             shape,
             sample_time_s: predictor.sample_time_s(),
-            lambda_g: settings.regularisation.raw_lambda_g(columns),
+            columns: predictor.reduction().columns_before,
             compliance,
-            weights,
-            bounds: BoundRows::new(
-                shape,
-                settings,
-                &predictor.row_scales()[shape.past_rows()..],
-            ),
-            past: vec![0.0; shape.past_rows()],
+            cost: StageCost::new(shape, settings),
+            rows: ConstraintRows::new(shape, settings, future_scales),
+            known: vec![0.0; shape.known_rows()],
             reference: vec![0.0; shape.future_rows()],
             plan: Plan::empty(shape),
             settings: settings.clone(),
         })
     }
 
-    /// Stacks the moment into `past` and `reference`.
+    /// Stacks the moment into the known part and the reference, and moves the constraints.
     pub fn stack(&mut self, moment: &Moment<'_>) -> Result<(), ProgramError> {
         let Shape {
             inputs,
+            disturbances,
             outputs,
             horizons,
         } = self.shape;
-        let series = [
+        let measured = MeasuredDisturbances::or_none(moment.disturbances);
+        let (past_d, preview) = (measured.past, measured.preview);
+        // Nothing is expected where there is nothing.
+        let steps = |steps: usize| if disturbances == 0 { 0 } else { steps };
+        let series: [NamedSeries<'_>; 6] = [
             (
                 "the past of the inputs",
                 moment.past_inputs,
@@ -73,10 +87,22 @@ impl Common {
                 inputs,
             ),
             (
+                "the past of the disturbances",
+                past_d,
+                steps(horizons.past),
+                disturbances,
+            ),
+            (
                 "the past of the outputs",
                 moment.past_outputs,
                 horizons.past,
                 outputs,
+            ),
+            (
+                "the preview of the disturbances",
+                preview,
+                steps(horizons.future),
+                disturbances,
             ),
             (
                 "the input reference",
@@ -91,77 +117,72 @@ impl Common {
                 outputs,
             ),
         ];
-        for (name, series, rows, columns) in series {
+        for &(name, series, rows, columns) in &series {
             check_series(name, series, rows, columns)?;
         }
-        let (past_u, past_y) = self.past.split_at_mut(inputs * horizons.past);
-        stack_into(moment.past_inputs, past_u);
-        stack_into(moment.past_outputs, past_y);
-        let (future_u, future_y) = self.reference.split_at_mut(inputs * horizons.future);
-        stack_into(moment.input_reference, future_u);
-        stack_into(moment.output_reference, future_y);
+        let (known, reference) = series.split_at(4);
+        stack_all(known, &mut self.known);
+        stack_all(reference, &mut self.reference);
+        self.rows.move_bounds(&self.known, &self.reference);
         self.plan.status = QpStatus::NotRun;
         Ok(())
     }
 
-    /// `‖u − u_r‖²_R` and `‖y − y_r‖²_Q` of the future f.
-    pub fn tracking(&self, future: &[f64]) -> (f64, f64) {
-        let first_output = self.shape.inputs * self.shape.horizons.future;
-        let cost = |range: std::ops::Range<usize>| -> f64 {
-            range
-                .map(|i| {
-                    let error = future[i] - self.reference[i];
-                    self.weights[i] * error * error
-                })
-                .sum()
-        };
-        (cost(0..first_output), cost(first_output..future.len()))
+    pub fn tracking(&self, future: &[f64]) -> TrackingCost {
+        self.cost.tracking(future, &self.known, &self.reference)
     }
 
-    /// Writes a plan. `model_cost` is `λ_g‖g‖²` plus the slack costs.
-    pub fn write_plan(&mut self, future: &[f64], model_cost: f64, ending: Ending) {
-        let (input_tracking, output_tracking) = self.tracking(future);
-        let penalty = self.bounds.penalty(future);
+    pub fn write_plan(&mut self, future: &[f64], ending: Ending) {
+        let tracking = self.tracking(future).total();
         let plan = &mut self.plan;
+        let judgement = self.rows.judge(future, &mut plan.output_violation);
         let first_output = self.shape.inputs * self.shape.horizons.future;
         unstack_into(&future[..first_output], plan.inputs.as_mut());
         unstack_into(&future[first_output..], plan.outputs.as_mut());
-        plan.objective = input_tracking + output_tracking + model_cost + penalty;
-        plan.input_violation = self
-            .bounds
-            .largest_violations(future, &mut plan.output_violation);
-        plan.origin = ending.origin;
-        plan.status = ending.status;
-        plan.iterations = ending.iterations;
-        plan.residual = ending.residual;
+        plan.tracking = tracking;
+        plan.soft_penalty = judgement.penalty;
+        plan.input_violation = judgement.inputs;
+        plan.constraint_violation = judgement.others;
+        ending.write_to(plan);
     }
 
     /// Marks the plan as unusable.
     pub fn reject(&mut self, ending: Ending) {
-        self.plan.objective = f64::NAN;
-        self.plan.origin = ending.origin;
-        self.plan.status = ending.status;
-        self.plan.iterations = ending.iterations;
-        self.plan.residual = ending.residual;
+        self.plan.tracking = f64::NAN;
+        self.plan.soft_penalty = f64::NAN;
+        ending.write_to(&mut self.plan);
     }
 
-    /// The parts of the objective from g and σ (as `col(σ_u, σ_y)`).
-    pub fn parts(&self, future: &[f64], g: &[f64], slack: &[f64]) -> ObjectiveParts {
-        let (input_tracking, output_tracking) = self.tracking(future);
-        let past_u = self.shape.inputs * self.shape.horizons.past;
-        let slack_cost = |range: std::ops::Range<usize>| -> f64 {
-            range
-                .filter(|&i| self.compliance[i] > 0.0)
-                .map(|i| slack[i] * slack[i] / self.compliance[i])
-                .sum()
-        };
+    /// `λ_u‖σ_u‖²` (with the slack of the disturbances) and `λ_y‖σ_y‖²`, from the slack of every
+    /// known entry.
+    pub fn slack_costs(&self, slack: &[f64]) -> (f64, f64) {
+        let outputs = self.shape.rows_of(Block::PastOutputs);
+        let mut costs = (0.0, 0.0);
+        for (i, (value, compliance)) in slack.iter().zip(&self.compliance).enumerate() {
+            if *compliance > 0.0 {
+                let cost = value * value / compliance;
+                if outputs.contains(&i) {
+                    costs.1 += cost;
+                } else {
+                    costs.0 += cost;
+                }
+            }
+        }
+        costs
+    }
+
+    /// The parts of the objective, from what g costs and the slack of every known entry.
+    pub fn parts(&self, future: &[f64], regularisation: f64, slack: &[f64]) -> ObjectiveParts {
+        let tracking = self.tracking(future);
+        let (input_slack, output_slack) = self.slack_costs(slack);
         ObjectiveParts {
-            input_tracking,
-            output_tracking,
-            regularisation: self.lambda_g * crate::linalg::dot(g, g),
-            input_slack: slack_cost(0..past_u),
-            output_slack: slack_cost(past_u..slack.len()),
-            soft_bounds: self.bounds.penalty(future),
+            input_tracking: tracking.inputs,
+            output_tracking: tracking.outputs,
+            input_change: tracking.changes,
+            regularisation,
+            input_slack,
+            output_slack,
+            soft_bounds: self.rows.penalty(future),
         }
     }
 }
@@ -185,11 +206,11 @@ impl Ending {
         }
     }
 
-    /// No solver was asked: hard slack cannot explain the past.
-    pub fn refused() -> Self {
+    /// No solver was asked.
+    pub fn refused(status: QpStatus) -> Self {
         Self {
             origin: PlanOrigin::Solver,
-            status: QpStatus::Infeasible,
+            status,
             iterations: 0,
             residual: f64::NAN,
         }
@@ -203,9 +224,27 @@ impl Ending {
             residual: solution.certificate.relative,
         }
     }
+
+    fn write_to(self, plan: &mut Plan) {
+        plan.origin = self.origin;
+        plan.status = self.status;
+        plan.iterations = self.iterations;
+        plan.residual = self.residual;
+    }
 }
 
-fn check_series(
+pub(super) type NamedSeries<'a> = (&'static str, MatRef<'a, f64>, usize, usize);
+
+pub(super) fn stack_all(series: &[NamedSeries<'_>], target: &mut [f64]) {
+    let mut rest = target;
+    for (_, series, ..) in series {
+        let (now, later) = rest.split_at_mut(series.nrows() * series.ncols());
+        stack_into(*series, now);
+        rest = later;
+    }
+}
+
+pub(super) fn check_series(
     name: &'static str,
     series: MatRef<'_, f64>,
     expected_rows: usize,

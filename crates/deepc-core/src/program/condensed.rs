@@ -1,51 +1,63 @@
 //! The condensed form: g and the slacks eliminated at set-up.
 
 use faer::Mat;
-use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
 
 use super::common::{Common, Ending};
 use super::error::ProgramError;
-use super::past_factor::PastFactor;
+use super::future_map::Elimination;
+use super::gain::Gain;
 use super::plan::{Moment, Plan, Recovered};
+use super::recover::{least_norm, recovered};
 use super::settings::DeepcSettings;
 use super::{CONSISTENCY_TOLERANCE, DeepcProgram};
-use crate::hankel::{Shape, unstack_into};
+use crate::hankel::Shape;
 use crate::linalg;
 use crate::predictor::Predictor;
-use crate::solver::{QpMatrix, QpProblem, QpSolution, QpStatus, QpVectors};
+use crate::solver::{CscMatrix, QpMatrix, QpProblem, QpSolution, QpStatus, QpVectors};
 
-/// An unconstrained optimum counts as meeting a bound that it misses by no more than this
-/// fraction of the channel's size. Inputs are clipped to their bounds in any case.
+/// An unconstrained optimum counts as meeting a constraint that it misses by no more than this
+/// fraction of the constraint's size. Inputs are clipped to their bounds in any case.
 const BOUND_TOLERANCE: f64 = 1e-9;
 
-/// The `DeePC` problem in the variables z of f = f0 + F z (with f = col(u, y)), (m+p)N of them,
-/// whatever the length of the recording:
+/// A row that moves less than this fraction of the most movable one (both in sizes of their
+/// channels) does not move.
+const ROW_TOLERANCE: f64 = 1e-13;
+
+/// The `DeePC` problem in at most (m+p)N variables, whatever the length of the recording, and
+/// whitened: with f = Φz + F ζ + B η (module `future_map`), x = (ζ, η), M = [F B] and
 ///
 /// ```text
-/// min ‖z‖² + ‖f − r‖²_W + soft bounds      s.t. bounds on f,      W = blkdiag(R, Q)
-/// P = 2(I + FᵀWF)    q = 2FᵀW(f0 − r)    rows: those of F whose signal is bounded
+/// RᵀR = blkdiag(I, 0) + MᵀWM      V = R⁻ᵀMᵀ      G = VᵀV
+/// f* = (I − GW)Φz + GW r          the optimum without constraints: one constant matrix
+/// min ‖s‖²                        s.t. constraints on f = f* + Vᵀs, soft ones at their price
 /// ```
 ///
-/// plus the constant ‖a‖² (module `past_factor`). Exact: the optimum is that of
-/// [`super::SparseProgram`] for any data, also without noise, where F is singular. It needs the
-/// squared 2-norm of g and of the slacks.
+/// so that s = 0 is the unconstrained optimum, the Hessian is 2I, and only the bounds move from
+/// step to step. W holds R, Q and the weights of input changes.
 ///
-/// Set-up costs one QR decomposition of (J + (m+p)·`T_ini`)×(m+p)L, about 0.1 s for 600×3001
-/// data. A step costs a few products with (m+p)N×(m+p)N matrices.
+/// Exact: the optimum is that of [`super::SparseProgram`] for any data, also without noise. It
+/// needs squared norms; ‖g‖₁ is refused.
+///
+/// Set-up costs one QR decomposition of the data, about 0.1 s for 600×3001. A step costs one
+/// product with an (m+p)N×(known + references) matrix, and what the solver does.
 pub struct CondensedProgram {
     common: Common,
-    factor: PastFactor,
+    elimination: Elimination,
     qp: QpProblem,
-    /// Lower Cholesky factor of I + `FᵀWF`.
-    hessian_factor: Mat<f64>,
-    a: Vec<f64>,
-    f0: Vec<f64>,
+    gain: Gain,
+    /// Entries of f that no row of the program gives by itself, and their rows of Vᵀ.
+    others: Vec<usize>,
+    other_rows: Mat<f64>,
+    other_values: Vec<f64>,
+    /// Row of the program that gives an entry of f: (entry, row).
+    givers: Vec<(usize, usize)>,
+    /// f*.
+    optimum: Vec<f64>,
     /// f of the present plan.
     future: Vec<f64>,
-    /// z of the present plan.
-    z: Vec<f64>,
-    weighted: Vec<f64>,
-    linear: Vec<f64>,
+    /// s of the present plan.
+    s: Vec<f64>,
+    zeros: Vec<f64>,
     lower: Vec<f64>,
     upper: Vec<f64>,
 }
@@ -54,70 +66,141 @@ impl CondensedProgram {
     /// Set-up.
     ///
     /// # Errors
-    /// A setting is out of range, or the data and weights span too many orders of magnitude.
+    /// A setting is out of range, the data and weights span too many orders of magnitude, the
+    /// cost does not determine the plan, or the regularisation is the 1-norm.
     pub fn new(predictor: &Predictor, settings: &DeepcSettings) -> Result<Self, ProgramError> {
         let common = Common::new(predictor, settings)?;
-        let factor = PastFactor::new(predictor, common.lambda_g, &common.compliance)?;
-        let f = &factor.future;
-        let n = f.ncols();
-        // Cholesky factor of I + FᵀWF from the QR decomposition of [I; W^½F].
-        let stacked = Mat::from_fn(2 * n, n, |i, j| match i.checked_sub(n) {
-            Some(i) => common.weights[i].sqrt() * f[(i, j)],
-            None => f64::from(u8::from(i == j)),
-        });
-        let hessian_factor = linalg::lower_from_upper(stacked.qr().thin_R());
-        let product = &hessian_factor * hessian_factor.transpose();
-        // The product of a matrix and its transpose is symmetric only up to rounding.
-        let hessian = Mat::from_fn(n, n, |i, j| product[(i, j)] + product[(j, i)]);
-        let bounds = &common.bounds;
-        let rows = Mat::from_fn(bounds.len(), n, |i, j| {
-            f[(bounds.positions[i], j)] / bounds.scales[i]
-        });
-        let qp = QpProblem::new(
-            QpMatrix::Dense(hessian),
-            QpMatrix::Dense(rows),
-            bounds.row_penalties().collect(),
+        let elimination = Elimination::new(
+            predictor,
+            &settings.regularisation,
+            common.columns,
+            &common.compliance,
         )?;
-        let bound_count = bounds.len();
+        let gain = Gain::new(&common, &elimination, predictor)?;
+        let spread = &gain.spread;
+        let (n, k) = spread.shape();
+
+        let rows = &common.rows;
+        let mut matrix = Mat::zeros(rows.len(), k);
+        for i in 0..rows.len() {
+            for (position, coefficient) in rows.terms(i) {
+                let factor = coefficient / rows.scales[i];
+                for j in 0..k {
+                    matrix[(i, j)] += factor * spread[(position, j)];
+                }
+            }
+        }
+        clear_rounding(&mut matrix);
+        let diagonal = (0..k).map(|i| (i, i, 2.0)).collect();
+        let qp = QpProblem::new(
+            QpMatrix::Sparse(CscMatrix::from_triplets(k, k, diagonal)?),
+            QpMatrix::Dense(matrix),
+            rows.row_penalties().collect(),
+        )?;
+        let mut giver = vec![None; n];
+        for row in 0..rows.len() {
+            if let Some(position) = rows.single(row) {
+                giver[position].get_or_insert(row);
+            }
+        }
+        let others: Vec<_> = (0..n).filter(|&i| giver[i].is_none()).collect();
+        let givers = giver.into_iter().enumerate();
         Ok(Self {
-            a: vec![0.0; factor.rank()],
-            f0: vec![0.0; n],
+            givers: givers.filter_map(|(i, row)| Some((i, row?))).collect(),
+            other_rows: Mat::from_fn(others.len(), k, |i, j| spread[(others[i], j)]),
+            other_values: vec![0.0; others.len()],
+            others,
+            optimum: vec![0.0; n],
             future: vec![0.0; n],
-            z: vec![0.0; n],
-            weighted: vec![0.0; n],
-            linear: vec![0.0; n],
-            lower: vec![0.0; bound_count],
-            upper: vec![0.0; bound_count],
+            s: vec![0.0; k],
+            zeros: vec![0.0; k],
+            lower: vec![0.0; rows.len()],
+            upper: vec![0.0; rows.len()],
             common,
-            factor,
+            elimination,
             qp,
-            hessian_factor,
+            gain,
         })
     }
 
-    /// f = f0 + F z.
-    fn predict_future(&mut self) {
-        self.future.copy_from_slice(&self.f0);
-        linalg::multiply_add(&mut self.future, self.factor.future.as_ref(), &self.z, 1.0);
+    /// f = f* + Vᵀs, where the solver has not computed it as the value of a row.
+    fn predict_future(&mut self, values: &[f64]) {
+        self.future.copy_from_slice(&self.optimum);
+        for &(position, row) in &self.givers {
+            self.future[position] += self.common.rows.scales[row] * values[row];
+        }
+        if !self.others.is_empty() {
+            linalg::multiply(&mut self.other_values, self.other_rows.as_ref(), &self.s);
+            for (&position, value) in self.others.iter().zip(&self.other_values) {
+                self.future[position] += value;
+            }
+        }
     }
 
-    fn model_cost(&self) -> f64 {
-        linalg::dot(&self.a, &self.a) + linalg::dot(&self.z, &self.z)
+    fn optimum_is_finite(&self) -> bool {
+        self.optimum.iter().all(|value| value.is_finite())
     }
 
     fn past_is_consistent(&self) -> bool {
         self.common.plan.past_inconsistency <= CONSISTENCY_TOLERANCE
     }
 
-    /// The gain of the unconstrained optimum: f* = f0 + G W (r − f0) with the returned
-    /// G = F(I + FᵀWF)⁻¹Fᵀ, (m+p)N×(m+p)N, rows and columns col(u, y). For study: it shows how
-    /// far a reference of one channel and step is followed by every other.
+    /// G of the unconstrained optimum f* = (I − GW)Φz + GW r, (m+p)N×(m+p)N, rows and columns
+    /// col(u, y). For study: it shows how far a reference of one channel and step is followed by
+    /// every other.
     #[must_use]
-    pub fn gain(&self) -> Mat<f64> {
-        let mut v = self.factor.future.transpose().to_owned();
-        let lower = self.hessian_factor.as_ref();
-        solve_lower_triangular_in_place(lower, v.as_mut(), faer::Par::Seq);
-        v.transpose() * &v
+    pub fn reference_gain(&self) -> Mat<f64> {
+        &self.gain.spread * self.gain.spread.transpose()
+    }
+
+    /// The constant matrix K of the unconstrained optimum f* = K θ. θ is the known part
+    /// `z = col(u_ini, d_ini, y_ini, d)` and the entries of the reference r that have a weight; where
+    /// the data span z so badly that digits would be lost, z is replaced by its coordinates.
+    #[must_use]
+    pub fn optimum_gain(&self) -> faer::MatRef<'_, f64> {
+        self.gain.matrix.as_ref()
+    }
+
+    /// x = (ζ, η) of the present plan.
+    fn coordinates(&self) -> Vec<f64> {
+        let map = self.elimination.map();
+        let n = self.optimum.len();
+        let mut c = vec![0.0; map.known.ncols()];
+        self.elimination
+            .write_coordinates(&self.common.known, &mut c);
+        let mut start = vec![0.0; n];
+        linalg::multiply(&mut start, map.known.as_ref(), &c);
+        let mut pull = vec![0.0; n];
+        self.common
+            .cost
+            .pull(&self.common.known, &self.common.reference, &mut pull);
+        for (i, j, weight) in self.common.cost.curvature() {
+            pull[i] -= weight * start[j];
+        }
+        let mut x = self.s.clone();
+        linalg::multiply_add(&mut x, self.gain.spread.transpose(), &pull, 1.0);
+        linalg::solve_upper(self.gain.root.as_ref(), &mut x);
+        x
+    }
+
+    /// What g and the slacks of the present plan cost.
+    fn model_cost(&self) -> f64 {
+        let charged = self.elimination.map().charged.ncols();
+        let x = self.coordinates();
+        let zeta = &x[..charged];
+        self.elimination.known_cost(&self.common) + linalg::dot(zeta, zeta)
+    }
+}
+
+/// Rows that nothing decided can move are zero but for rounding, and a solver would move them all
+/// the same, at a senseless price.
+fn clear_rounding(rows: &mut Mat<f64>) {
+    let lengths: Vec<_> = rows.row_iter().map(|row| row.norm_l2()).collect();
+    let limit = ROW_TOLERANCE * linalg::max_abs(&lengths);
+    for (i, &length) in lengths.iter().enumerate() {
+        if length <= limit {
+            rows.row_mut(i).fill(0.0);
+        }
     }
 }
 
@@ -141,57 +224,48 @@ impl DeepcProgram for CondensedProgram {
     fn set_moment(&mut self, moment: &Moment<'_>) -> Result<(), ProgramError> {
         self.common.stack(moment)?;
         let common = &mut self.common;
-        common.plan.past_inconsistency =
-            self.factor.predict(&common.past, &mut self.a, &mut self.f0);
-        for (i, weighted) in self.weighted.iter_mut().enumerate() {
-            *weighted = 2.0 * common.weights[i] * (self.f0[i] - common.reference[i]);
-        }
-        let f = self.factor.future.as_ref();
-        linalg::multiply(&mut self.linear, f.transpose(), &self.weighted);
-        let bounds = &common.bounds;
-        for (row, &position) in bounds.positions.iter().enumerate() {
-            let (start, scale) = (self.f0[position], bounds.scales[row]);
-            self.lower[row] = (bounds.lower[row] - start) / scale;
-            self.upper[row] = (bounds.upper[row] - start) / scale;
-        }
+        common.plan.past_inconsistency = self.elimination.inconsistency(&common.known);
+        self.gain
+            .write_optimum(common, &self.elimination, &mut self.optimum);
+        common
+            .rows
+            .bounds_from(&self.optimum, &mut self.lower, &mut self.upper);
         Ok(())
     }
 
     fn vectors(&self) -> QpVectors<'_> {
         QpVectors {
-            linear: &self.linear,
+            linear: &self.zeros,
             lower: &self.lower,
             upper: &self.upper,
         }
     }
 
     fn plan_unconstrained(&mut self) -> bool {
-        if !self.past_is_consistent() {
+        if !self.optimum_is_finite()
+            || !self.past_is_consistent()
+            || !self.common.rows.are_met(&self.optimum, BOUND_TOLERANCE)
+        {
             return false;
         }
-        // z = −P⁻¹q with P = 2 L Lᵀ.
-        for (z, linear) in self.z.iter_mut().zip(&self.linear) {
-            *z = -0.5 * linear;
-        }
-        linalg::solve_lower(self.hessian_factor.as_ref(), &mut self.z);
-        linalg::solve_upper(self.hessian_factor.transpose(), &mut self.z);
-        self.predict_future();
-        let finite = self.future.iter().all(|value| value.is_finite());
-        if !finite || !self.common.bounds.are_met(&self.future, BOUND_TOLERANCE) {
-            return false;
-        }
-        let model_cost = self.model_cost();
+        self.s.fill(0.0);
+        self.future.copy_from_slice(&self.optimum);
         self.common
-            .write_plan(&self.future, model_cost, Ending::unconstrained());
+            .write_plan(&self.future, Ending::unconstrained());
         true
     }
 
     fn refuse_past(&mut self) -> bool {
-        let refused = !self.past_is_consistent();
-        if refused {
-            self.common.reject(Ending::refused());
-        }
-        refused
+        // Without a constraint no solver would notice.
+        let ending = if !self.optimum_is_finite() {
+            Ending::refused(QpStatus::InvalidData)
+        } else if !self.past_is_consistent() {
+            Ending::refused(QpStatus::Infeasible)
+        } else {
+            return false;
+        };
+        self.common.reject(ending);
+        true
     }
 
     fn accept(&mut self, solution: &QpSolution) {
@@ -199,45 +273,55 @@ impl DeepcProgram for CondensedProgram {
         if !self.past_is_consistent() {
             ending.status = QpStatus::Infeasible;
         }
-        if !ending.status.is_usable() || solution.primal.len() != self.z.len() {
+        if !self.optimum_is_finite() {
+            ending.status = QpStatus::InvalidData;
+        }
+        let fits = solution.primal.len() == self.s.len() && solution.rows.len() == self.lower.len();
+        if ending.status.is_usable() && !fits {
+            ending.status = QpStatus::NumericalError;
+        }
+        if !ending.status.is_usable() {
             self.common.reject(ending);
             return;
         }
-        self.z.copy_from_slice(&solution.primal);
-        self.predict_future();
-        let model_cost = self.model_cost();
-        self.common.write_plan(&self.future, model_cost, ending);
+        self.s.copy_from_slice(&solution.primal);
+        self.predict_future(&solution.rows);
+        self.common.write_plan(&self.future, ending);
     }
 
     fn plan(&self) -> &Plan {
         &self.common.plan
     }
 
+    fn objective(&self) -> Option<f64> {
+        let plan = &self.common.plan;
+        plan.is_usable()
+            .then(|| plan.tracking + plan.soft_penalty + self.model_cost())
+    }
+
     fn recover(&self) -> Option<Recovered> {
         if !self.common.plan.is_usable() {
             return None;
         }
-        let (g, slack) = self.factor.recover(&self.a, &self.z);
-        Some(recovered(&self.common, &self.future, g, &slack))
-    }
-}
-
-/// Puts g and `col(σ_u, σ_y)` into the shape the user sees.
-pub(super) fn recovered(common: &Common, future: &[f64], g: Vec<f64>, slack: &[f64]) -> Recovered {
-    let Shape {
-        inputs,
-        outputs,
-        horizons,
-    } = common.shape;
-    let (slack_u, slack_y) = slack.split_at(inputs * horizons.past);
-    let mut input_slack = Mat::zeros(horizons.past, inputs);
-    let mut output_slack = Mat::zeros(horizons.past, outputs);
-    unstack_into(slack_u, input_slack.as_mut());
-    unstack_into(slack_y, output_slack.as_mut());
-    Recovered {
-        parts: common.parts(future, &g, slack),
-        g,
-        input_slack,
-        output_slack,
+        let (known, x) = (&self.common.known, self.coordinates());
+        let (g, slack, regularisation) = match &self.elimination {
+            Elimination::Charged(charged) => {
+                let factor = &charged.0;
+                let (g, slack) = factor.recover(&factor.coordinates(known), &x);
+                let regularisation = factor.lambda_g() * linalg::dot(&g, &g);
+                (g, slack, regularisation)
+            }
+            Elimination::Free(free) => {
+                let zeta = &x[..free.map.charged.ncols()];
+                let slack = free.slack(known, zeta);
+                let past = known.iter().zip(&slack).map(|(z, slack)| z + slack);
+                let target: Vec<_> = past.chain(self.future.iter().copied()).collect();
+                let (inputs, outputs) = self.common.slack_costs(&slack);
+                let rest = (self.model_cost() - inputs - outputs).max(0.0);
+                (least_norm(free.predictor(), &target)?, slack, rest)
+            }
+        };
+        let common = &self.common;
+        Some(recovered(common, &self.future, g, &slack, regularisation))
     }
 }

@@ -51,16 +51,101 @@ pub enum SettingsError {
     },
     /// A soft bound's penalty is out of range.
     #[error(
-        "`output_bounds[{index}].softness` has linear {linear} and quadratic {quadratic}; both \
-         must be finite and at least 0, and one above 0"
+        "`{field}[{index}]` has linear {linear} and quadratic {quadratic}; both must be finite and \
+         at least 0, and one above 0"
     )]
     Penalty {
-        /// Output, from 0.
+        /// Field.
+        field: &'static str,
+        /// Channel or constraint, from 0.
         index: usize,
         /// ρ.
         linear: f64,
         /// w.
         quadratic: f64,
+    },
+    /// `λ_g` is given where nothing is charged.
+    #[error("`regularisation.lambda_g` is {found}, but this kind charges nothing; give 0")]
+    UnusedLambda {
+        /// Value found.
+        found: f64,
+    },
+    /// A table does not have one row per step of the horizon.
+    #[error("`{field}` has {found} rows, expected {expected}: give one per step, or none")]
+    Rows {
+        /// Field.
+        field: &'static str,
+        /// N.
+        expected: usize,
+        /// Rows found.
+        found: usize,
+    },
+    /// A row of a table does not have one entry per channel.
+    #[error("`{field}[{step}]` has {found} entries, expected {expected}: give one per channel")]
+    RowLength {
+        /// Field.
+        field: &'static str,
+        /// Step, from 0.
+        step: usize,
+        /// Channels.
+        expected: usize,
+        /// Entries found.
+        found: usize,
+    },
+    /// A factor of a table is negative or not finite.
+    #[error("`{field}[{step}][{index}]` is {found}; give a finite value of at least 0")]
+    Factor {
+        /// Field.
+        field: &'static str,
+        /// Step, from 0.
+        step: usize,
+        /// Channel, from 0.
+        index: usize,
+        /// Value found.
+        found: f64,
+    },
+    /// A coefficient list of an affine constraint does not have one entry per channel.
+    #[error(
+        "`affine[{index}].{field}` has {found} entries, expected {expected}: give one per channel"
+    )]
+    AffineLength {
+        /// `inputs` or `outputs`.
+        field: &'static str,
+        /// Constraint, from 0.
+        index: usize,
+        /// Channels.
+        expected: usize,
+        /// Entries found.
+        found: usize,
+    },
+    /// A constraint speaks of steps that the horizon does not have.
+    #[error(
+        "`{field}[{index}]` speaks of {found}, but the horizon has {horizon} steps: give `at` 0 to \
+         {horizon} − 1, or `last` 1 to {horizon}"
+    )]
+    Steps {
+        /// Field.
+        field: &'static str,
+        /// Constraint, from 0.
+        index: usize,
+        /// Steps found.
+        found: usize,
+        /// N.
+        horizon: usize,
+    },
+    /// A coefficient of an affine constraint is not finite.
+    #[error("`affine[{index}]` has the coefficient {found}; give finite ones")]
+    Coefficient {
+        /// Constraint, from 0.
+        index: usize,
+        /// Value found.
+        found: f64,
+    },
+    /// An affine constraint constrains nothing.
+    #[error("`affine[{index}]` has no coefficient other than 0; leave it out")]
+    NoCoefficient {
+        /// Constraint, from 0.
+        index: usize,
     },
 }
 
@@ -121,9 +206,9 @@ pub enum ProgramError {
          penalty, raise `lambda_g`, or make this slack `hard`"
     )]
     SlackLost {
-        /// Row of `col(u_ini, y_ini)`, from 0.
+        /// Entry of the known part `col(u_ini, d_ini, y_ini, d)`, from 0.
         row: usize,
-        /// `λ_u` or `λ_y`.
+        /// `λ_u` or `λ_y`, or that of the disturbances.
         lambda: f64,
         /// Pivot left to the entry.
         pivot: f64,
@@ -131,6 +216,58 @@ pub enum ProgramError {
         column: f64,
         /// That fraction.
         tolerance: f64,
+    },
+    /// Some directions of the future cost nothing, so that the optimum is not determined.
+    #[error(
+        "the cost does not determine the plan: direction {direction} of {directions} has a \
+         curvature of {curvature:e} beside {largest:e}; give every input a weight, or regularise g"
+    )]
+    Undetermined {
+        /// First direction without a cost, from 0.
+        direction: usize,
+        /// All directions.
+        directions: usize,
+        /// Its pivot.
+        curvature: f64,
+        /// The largest pivot.
+        largest: f64,
+    },
+    /// A singular value decomposition did not converge.
+    #[error(
+        "the singular value decomposition of {what} ({size}×{size}) does not converge; bring the \
+         channels to similar sizes"
+    )]
+    Decomposition {
+        /// Of what.
+        what: &'static str,
+        /// Its size.
+        size: usize,
+    },
+    /// This form of the program cannot have this regularisation.
+    #[error("{form} cannot have the regularisation {part}; {remedy}")]
+    Form {
+        /// Which form.
+        form: &'static str,
+        /// Which part of g.
+        part: &'static str,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// The data cannot make every input sequence of the horizon.
+    #[error(
+        "input `{channel}` cannot be chosen freely at step {step} of the horizon: the data leave \
+         {pivot:e} of it, {needed:e} is needed; the inputs do not excite the plant, or there are \
+         too few columns: shake every input independently, record longer, or shorten the horizons"
+    )]
+    InputsNotExciting {
+        /// Input channel.
+        channel: String,
+        /// Step of the horizon, from 0.
+        step: usize,
+        /// Part of the input that what comes before does not determine, relative to it.
+        pivot: f64,
+        /// Smallest that counts.
+        needed: f64,
     },
     /// The quadratic program or its solver refused.
     #[error(transparent)]

@@ -1,39 +1,50 @@
 //! Stage 4: the `DeePC` problem, with its constant matrices built once.
 //!
-//! With the data matrix H̄ (q columns) and the stacked `w = col(u_ini, y_ini, u, y)`, every step
-//! solves (Coulson, Lygeros, Dörfler 2019; the regularised form of Elokda et al. 2021)
+//! With the data matrix H̄ (c columns) and the stacked `w = col(u_ini, d_ini, y_ini, d, u, y)`, every
+//! step solves (Coulson, Lygeros, Dörfler 2019; the regularised form of Elokda et al. 2021)
 //!
 //! ```text
 //! min  ‖u − u_r‖²_R + ‖y − y_r‖²_Q + λ_g‖g‖² + λ_u‖σ_u‖² + λ_y‖σ_y‖² + Σ (ρs + ½ws²)
 //! s.t. U_p g = u_ini + σ_u      Y_p g = y_ini + σ_y      U_f g = u      Y_f g = y
+//!      D_p g = d_ini             D_f g = d               (measured disturbances, if there are any)
 //!      u within its bounds,  y within its bounds (hard, or exceeded by s ≥ 0 at the price above)
 //! ```
 //!
-//! in one of two forms with the same optimum:
+//! and what [`ProgramOptions`] adds, with another charge on g if [`Regularisation`] says so, in one of
+//! two forms with the same optimum:
 //!
 //! | | variables | rows | cost of a step depends on |
 //! |---|---|---|---|
-//! | [`SparseProgram`] | g, u, y, σ: q + (m+p)N + (m+p)`T_ini` | (m+p)L + bounds | the data length |
-//! | [`CondensedProgram`] | (m+p)N | bounds | N only |
+//! | [`SparseProgram`] | g, u, y, σ: c + (m+p)N + (m+q+p)`T_ini` + qN | (m+q+p)L + constraints | the data length |
+//! | [`CondensedProgram`] | at most (m+p)N | constraints | the horizons only |
 //!
 //! Both are [`DeepcProgram`]s, so a controller does not know which one it has.
 
-mod bounds;
 mod common;
 mod condensed;
 mod damping;
 mod error;
+mod free_past;
+mod future_map;
+mod gain;
+mod options;
+mod output_predictor;
 mod past_factor;
 mod plan;
+mod recover;
+mod regularisation;
+mod rows;
 mod settings;
 mod sparse;
+mod stage_cost;
 
 pub use condensed::CondensedProgram;
 pub use error::{ProgramError, SettingsError};
-pub use plan::{Moment, ObjectiveParts, Plan, PlanOrigin, Recovered};
-pub use settings::{
-    Bounds, DeepcSettings, Normalisation, OutputBounds, Regularisation, Slack, Softness,
-};
+pub use options::{AffineConstraint, DisturbanceSlack, ProgramOptions, Steps, Terminal};
+pub use output_predictor::OutputPredictor;
+pub use plan::{MeasuredDisturbances, Moment, ObjectiveParts, Plan, PlanOrigin, Recovered};
+pub use regularisation::{Normalisation, Regularisation, RegularisedPart};
+pub use settings::{Bounds, DeepcSettings, OutputBounds, Slack, Softness};
 pub use sparse::SparseProgram;
 
 use crate::hankel::Shape;
@@ -52,7 +63,9 @@ pub const CONSISTENCY_TOLERANCE: f64 = 1e-6;
 ///    plan if that optimum is known and meets every bound, and says so.
 /// 4. [`accept`](Self::accept) writes a solver's answer to the plan; only a usable status makes
 ///    a usable plan.
-/// 5. All forms of one problem have the same optimum.
+/// 5. All forms of one problem have the same optimum, for a past that is consistent with hard
+///    slack: the condensed form projects one that is off by up to [`CONSISTENCY_TOLERANCE`] and
+///    refuses others, the sparse form leaves the contradiction to the solver.
 pub trait DeepcProgram: Send {
     /// Sizes m, p, `T_ini`, N.
     fn shape(&self) -> Shape;
@@ -78,8 +91,9 @@ pub trait DeepcProgram: Send {
     /// Takes the unconstrained optimum as the plan if it is known and meets every bound.
     fn plan_unconstrained(&mut self) -> bool;
 
-    /// Ends the step as infeasible if it is known, before any solver is asked, that hard slack
-    /// cannot explain the past; whether it did.
+    /// Ends the step if it is known, before any solver is asked, that there is no plan: hard slack
+    /// cannot explain the past (`Infeasible`), or the moment holds NaN (`InvalidData`); whether it
+    /// did.
     fn refuse_past(&mut self) -> bool {
         false
     }
@@ -89,6 +103,11 @@ pub trait DeepcProgram: Send {
 
     /// The present plan.
     fn plan(&self) -> &Plan;
+
+    /// The objective of the present plan: tracking, what g and the slacks cost, and the price of
+    /// soft constraints; `None` if the plan is not usable. Takes several products: for study, not
+    /// for the control loop.
+    fn objective(&self) -> Option<f64>;
 
     /// g, the slacks and the parts of the objective of the present plan; `None` if the plan is
     /// not usable. Allocates and takes a product with the data matrix: for study, not for the

@@ -30,6 +30,7 @@ use faer::linalg::householder::{
     apply_block_householder_sequence_on_the_left_in_place_with_conj as apply_householder,
 };
 use faer::linalg::solvers::Qr;
+use faer::linalg::triangular_solve::solve_upper_triangular_in_place;
 use faer::{Conj, Mat, MatRef, Par};
 
 use super::damping::Damping;
@@ -63,8 +64,6 @@ pub(super) struct PastFactor {
     l21: Mat<f64>,
     /// F, (m+p)N×(m+p)N.
     pub future: Mat<f64>,
-    /// `w_ini` in `order`.
-    ordered: Vec<f64>,
 }
 
 /// What the hard entries leave.
@@ -161,7 +160,6 @@ impl PastFactor {
             deficient: split.deficient,
             l11,
             l21,
-            ordered: vec![0.0; past],
         };
         factor.check_slack_pivots(compliance)?;
         Ok(factor)
@@ -186,32 +184,85 @@ impl PastFactor {
         Ok(())
     }
 
-    /// Length of a.
-    pub fn rank(&self) -> usize {
-        self.l21.ncols()
+    /// Relative part of the hard entries of the past that the data cannot explain.
+    pub fn inconsistency(&mut self, past: &[f64]) -> f64 {
+        let Some(deficient) = &mut self.deficient else {
+            return 0.0;
+        };
+        deficient.inconsistency(self.order.iter().map(|&position| past[position]))
     }
 
-    /// Writes a and f0 for a past; returns the relative part of its hard entries that the data
-    /// cannot explain.
-    pub fn predict(&mut self, past: &[f64], a: &mut [f64], f0: &mut [f64]) -> f64 {
-        for (value, &position) in self.ordered.iter_mut().zip(&self.order) {
-            *value = past[position];
-        }
-        let (hard, soft) = self
-            .ordered
-            .split_at(self.order.len() - self.slack_roots.len());
-        let (from_hard, from_soft) = a.split_at_mut(self.l11.nrows() - soft.len());
-        let inconsistency = match &mut self.deficient {
-            None => {
-                from_hard.copy_from_slice(hard);
-                0.0
+    /// Length of a.
+    pub fn rank(&self) -> usize {
+        self.l11.nrows()
+    }
+
+    /// Writes a for a past.
+    pub fn write_coordinates(&self, past: &[f64], a: &mut [f64]) {
+        let soft = self.slack_roots.len();
+        let (hard_order, soft_order) = self.order.split_at(self.order.len() - soft);
+        let (from_hard, from_soft) = a.split_at_mut(self.l11.nrows() - soft);
+        match &self.deficient {
+            None => gather(past, hard_order, from_hard),
+            Some(deficient) => {
+                // α = map·w_h, column by column: w_h is scattered in the past.
+                from_hard.fill(0.0);
+                for (k, &position) in hard_order.iter().enumerate() {
+                    let column = deficient.map.col_as_slice(k);
+                    for (alpha, entry) in from_hard.iter_mut().zip(column) {
+                        *alpha += entry * past[position];
+                    }
+                }
             }
-            Some(deficient) => deficient.predict(hard, from_hard),
-        };
-        from_soft.copy_from_slice(soft);
+        }
+        gather(past, soft_order, from_soft);
         linalg::solve_lower(self.l11.as_ref(), a);
-        linalg::multiply(f0, self.l21.as_ref(), a);
-        inconsistency
+    }
+
+    /// a, from a past.
+    pub fn coordinates(&self, past: &[f64]) -> Vec<f64> {
+        let mut a = vec![0.0; self.rank()];
+        self.write_coordinates(past, &mut a);
+        a
+    }
+
+    /// f0 = `coordinate_map`·a, (m+p)N×(length of a).
+    pub fn coordinate_map(&self) -> &Mat<f64> {
+        &self.l21
+    }
+
+    /// X with X w = `gain`·a for every past w.
+    pub fn on_past(&self, gain: MatRef<'_, f64>) -> Mat<f64> {
+        // X L₁₁ = gain, as L₁₁ᵀXᵀ = gainᵀ.
+        let mut solved = gain.transpose().to_owned();
+        solve_upper_triangular_in_place(self.l11.transpose(), solved.as_mut(), Par::Seq);
+        let soft = self.slack_roots.len();
+        let rank = solved.nrows() - soft;
+        let from_hard = match &self.deficient {
+            None => solved.subrows(0, rank).transpose().to_owned(),
+            Some(deficient) => solved.subrows(0, rank).transpose() * &deficient.map,
+        };
+        let hard = from_hard.ncols();
+        let mut x = Mat::zeros(gain.nrows(), self.order.len());
+        for (k, &position) in self.order.iter().enumerate() {
+            let target = x.col_mut(position);
+            match k.checked_sub(hard) {
+                None => target
+                    .iter_mut()
+                    .zip(from_hard.col(k).iter())
+                    .for_each(|(t, &v)| *t = v),
+                Some(k) => target
+                    .iter_mut()
+                    .zip(solved.row(rank + k).iter())
+                    .for_each(|(t, &v)| *t = v),
+            }
+        }
+        x
+    }
+
+    /// Raw `λ_g`.
+    pub fn lambda_g(&self) -> f64 {
+        self.lambda_g_root * self.lambda_g_root
     }
 
     /// g (one entry per data column) and `col(σ_u, σ_y)` from (a, z): ζ = Θ(a, z).
@@ -245,6 +296,12 @@ impl PastFactor {
             slack[position] = -root * value;
         }
         (g, slack)
+    }
+}
+
+fn gather(source: &[f64], positions: &[usize], target: &mut [f64]) {
+    for (value, &position) in target.iter_mut().zip(positions) {
+        *value = source[position];
     }
 }
 
@@ -339,29 +396,15 @@ fn diagonal_size(r: MatRef<'_, f64>, size: usize) -> impl Iterator<Item = f64> +
 }
 
 impl Deficient {
-    fn predict(&mut self, past: &[f64], a: &mut [f64]) -> f64 {
-        linalg::multiply(a, self.map.as_ref(), past);
-        for (scaled, (value, scale)) in self
-            .scaled_past
-            .iter_mut()
-            .zip(past.iter().zip(&self.scales))
-        {
-            *scaled = value / scale;
-        }
-        let size = linalg::dot(&self.scaled_past, &self.scaled_past).sqrt();
-        linalg::multiply(
-            &mut self.coordinates,
-            self.span.transpose(),
-            &self.scaled_past,
-        );
-        linalg::multiply_add(
-            &mut self.scaled_past,
+    /// Relative part of the hard entries that the data cannot explain.
+    fn inconsistency(&mut self, past: impl Iterator<Item = f64>) -> f64 {
+        let scaled = self.scaled_past.iter_mut().zip(past.zip(&self.scales));
+        scaled.for_each(|(scaled, (value, scale))| *scaled = value / scale);
+        linalg::part_outside(
             self.span.as_ref(),
-            &self.coordinates,
-            -1.0,
-        );
-        let rest = linalg::dot(&self.scaled_past, &self.scaled_past).sqrt();
-        if size > 0.0 { rest / size } else { 0.0 }
+            &mut self.scaled_past,
+            &mut self.coordinates,
+        )
     }
 
     /// Coordinates with respect to `Θ_d` from α and those of the second QR decomposition.

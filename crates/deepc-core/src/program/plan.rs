@@ -17,6 +17,29 @@ pub struct Moment<'a> {
     pub input_reference: MatRef<'a, f64>,
     /// Output reference `y_r`, N×p.
     pub output_reference: MatRef<'a, f64>,
+    /// Measured disturbances, where the data have such channels.
+    pub disturbances: Option<MeasuredDisturbances<'a>>,
+}
+
+/// Measured disturbances at one sample instant. Rows are time, columns channels.
+#[derive(Debug, Clone, Copy)]
+pub struct MeasuredDisturbances<'a> {
+    /// Of the past, `T_ini`×q, oldest first.
+    pub past: MatRef<'a, f64>,
+    /// Expected over the horizon, N×q.
+    pub preview: MatRef<'a, f64>,
+}
+
+impl MeasuredDisturbances<'_> {
+    /// Those given, if they have channels; else none, 0×0.
+    pub(super) fn or_none(given: Option<Self>) -> Self {
+        let none = MatRef::from_column_major_slice(&[], 0, 0);
+        let given = given.filter(|given| given.past.ncols() + given.preview.ncols() > 0);
+        given.unwrap_or(Self {
+            past: none,
+            preview: none,
+        })
+    }
 }
 
 /// How a plan came about.
@@ -25,7 +48,7 @@ pub struct Moment<'a> {
 pub enum PlanOrigin {
     /// The optimum without bounds meets them all.
     Unconstrained,
-    /// A solver's answer.
+    /// A solver's answer, or none: see [`Plan::status`].
     Solver,
 }
 
@@ -36,12 +59,18 @@ pub struct Plan {
     pub inputs: Mat<f64>,
     /// y, N×p.
     pub outputs: Mat<f64>,
-    /// The whole objective: tracking, `λ_g‖g‖²`, slack and soft bounds.
-    pub objective: f64,
+    /// ‖u − `u_r‖²_R` + ‖y − `y_r‖²_Q` and the cost of input changes. The whole objective, with what
+    /// g and the slacks cost, is [`super::DeepcProgram::objective`].
+    pub tracking: f64,
+    /// Price of the violated soft constraints, Σ ρs + ½ws².
+    pub soft_penalty: f64,
     /// Largest violation of each output's bounds over the horizon, in the output's units (p).
     pub output_violation: Vec<f64>,
-    /// Largest violation of an input bound over the horizon (rounding of the solver).
+    /// Largest violation of a bound on the inputs or their changes over the horizon (rounding of
+    /// the solver).
     pub input_violation: f64,
+    /// Largest violation of an affine or terminal constraint, in its own units.
+    pub constraint_violation: f64,
     /// How it came about.
     pub origin: PlanOrigin,
     /// How the solve ended.
@@ -52,7 +81,7 @@ pub struct Plan {
     /// ([`crate::solver::Certificate::relative`]); 0 for an unconstrained optimum.
     pub residual: f64,
     /// Relative part of the past that the data cannot explain, where slack is hard and the data
-    /// do not span every past; 0 otherwise.
+    /// do not span every past; 0 otherwise, and always 0 in the sparse form.
     pub past_inconsistency: f64,
 }
 
@@ -62,9 +91,11 @@ impl Plan {
         Self {
             inputs: Mat::zeros(steps, shape.inputs),
             outputs: Mat::zeros(steps, shape.outputs),
-            objective: f64::NAN,
+            tracking: f64::NAN,
+            soft_penalty: f64::NAN,
             output_violation: vec![0.0; shape.outputs],
             input_violation: 0.0,
+            constraint_violation: 0.0,
             origin: PlanOrigin::Solver,
             status: QpStatus::NotRun,
             iterations: 0,
@@ -93,9 +124,11 @@ pub struct ObjectiveParts {
     pub input_tracking: f64,
     /// ‖y − `y_r‖²_Q`.
     pub output_tracking: f64,
-    /// `λ_g‖g‖²` (raw `λ_g`).
+    /// Cost of the input changes.
+    pub input_change: f64,
+    /// What g costs (`λ_g‖g‖²` with the raw `λ_g` for the squared norm).
     pub regularisation: f64,
-    /// `λ_u‖σ_u‖²`.
+    /// `λ_u‖σ_u‖²`, and what the slack of the measured disturbances costs.
     pub input_slack: f64,
     /// `λ_y‖σ_y‖²`.
     pub output_slack: f64,
@@ -109,6 +142,7 @@ impl ObjectiveParts {
     pub fn total(&self) -> f64 {
         self.input_tracking
             + self.output_tracking
+            + self.input_change
             + self.regularisation
             + self.input_slack
             + self.output_slack

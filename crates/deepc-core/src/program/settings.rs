@@ -4,60 +4,12 @@
 use serde::{Deserialize, Serialize};
 
 use super::error::SettingsError;
+use super::options::{ProgramOptions, check_weight};
+use super::regularisation::{Regularisation, RegularisedPart};
 use crate::solver::SoftPenalty;
 
-/// What `λ_g` multiplies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Normalisation {
-    /// `λ_g‖g‖²` with H as it is, as the papers write it. Its meaning changes with the length of
-    /// the recording: twice the columns J act like half the `λ_g`.
-    Raw,
-    /// `λ_g‖g‖²` with H/√J in place of H, that is `λ_g·J` of the raw form. Its meaning does not
-    /// change when more data of the same kind are recorded.
-    PerColumn,
-}
-
-/// Weight of the squared 2-norm of g.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Regularisation {
-    /// `λ_g`, finite and above 0.
-    pub lambda_g: f64,
-    /// What it multiplies.
-    pub normalisation: Normalisation,
-}
-
-impl Regularisation {
-    /// `lambda_g`·‖g‖² with H as it is.
-    #[must_use]
-    pub fn raw(lambda_g: f64) -> Self {
-        Self {
-            lambda_g,
-            normalisation: Normalisation::Raw,
-        }
-    }
-
-    /// `lambda_g`·‖g‖² with H/√J in place of H.
-    #[must_use]
-    pub fn per_column(lambda_g: f64) -> Self {
-        Self {
-            lambda_g,
-            normalisation: Normalisation::PerColumn,
-        }
-    }
-
-    /// `λ_g` of the raw form, for a Hankel matrix of J columns (before any reduction).
-    #[must_use]
-    pub fn raw_lambda_g(&self, columns: usize) -> f64 {
-        match self.normalisation {
-            Normalisation::Raw => self.lambda_g,
-            Normalisation::PerColumn => self.lambda_g * columns as f64,
-        }
-    }
-}
-
-/// How the past is matched.
+/// How the past is matched: `λ_u‖σ_u‖²` and `λ_y‖σ_y‖²` of the paper's eq. (deepc), or not at all.
+/// The condensed form is exact for both.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Slack {
@@ -76,9 +28,20 @@ impl Slack {
             Self::Hard => 0.0,
         }
     }
+
+    /// Checks the range of a penalty.
+    pub(super) fn check(&self, field: &'static str) -> Result<(), SettingsError> {
+        match *self {
+            Self::Penalty(found) if !(found.is_finite() && found > 0.0) => {
+                Err(SettingsError::Lambda { field, found })
+            }
+            Self::Penalty(_) | Self::Hard => Ok(()),
+        }
+    }
 }
 
-/// Bounds of one input over the whole horizon; always hard. Absent or infinite: no bound.
+/// Bounds of one signal in every step of the horizon, in its unit. Absent or infinite: no bound. A
+/// bound in single steps is an [`super::AffineConstraint`] with [`super::Steps::At`].
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Bounds {
@@ -219,14 +182,44 @@ pub struct DeepcSettings {
     pub input_bounds: Vec<Bounds>,
     /// Bounds of every output (p).
     pub output_bounds: Vec<OutputBounds>,
+    /// Costs and constraints beyond the paper's.
+    #[serde(default)]
+    pub options: ProgramOptions,
 }
 
 impl DeepcSettings {
-    /// Checks every field against its range, for m inputs and p outputs.
+    /// Weights and regularisation, with the same slack for past inputs and outputs, and nothing
+    /// else: no bounds, no options. To be completed with
+    /// `DeepcSettings { input_bounds: …, ..DeepcSettings::new(…) }`.
+    #[must_use]
+    pub fn new(
+        input_weights: &[f64],
+        output_weights: &[f64],
+        regularisation: Regularisation,
+        slack: Slack,
+    ) -> Self {
+        Self {
+            input_weights: input_weights.to_vec(),
+            output_weights: output_weights.to_vec(),
+            regularisation,
+            input_slack: slack,
+            output_slack: slack,
+            input_bounds: vec![Bounds::none(); input_weights.len()],
+            output_bounds: vec![OutputBounds::none(); output_weights.len()],
+            options: ProgramOptions::default(),
+        }
+    }
+
+    /// Checks every field against its range, for m inputs, p outputs and a horizon of N steps.
     ///
     /// # Errors
     /// Names the first field that is out of range.
-    pub fn check(&self, inputs: usize, outputs: usize) -> Result<(), SettingsError> {
+    pub fn check(
+        &self,
+        inputs: usize,
+        outputs: usize,
+        horizon: usize,
+    ) -> Result<(), SettingsError> {
         for (field, expected, found) in [
             ("input_weights", inputs, self.input_weights.len()),
             ("output_weights", outputs, self.output_weights.len()),
@@ -241,57 +234,73 @@ impl DeepcSettings {
                 });
             }
         }
-        let proper_weight = |value: f64| value.is_finite() && value >= 0.0;
         for (field, weights) in [
             ("input_weights", &self.input_weights),
             ("output_weights", &self.output_weights),
         ] {
             for (index, &found) in weights.iter().enumerate() {
-                if !proper_weight(found) {
-                    return Err(SettingsError::Weight {
-                        field,
-                        index,
-                        found,
-                    });
-                }
+                check_weight(field, index, found)?;
             }
         }
-        let mut lambdas = vec![("regularisation.lambda_g", self.regularisation.lambda_g)];
-        for (field, slack) in [
-            ("input_slack", self.input_slack),
-            ("output_slack", self.output_slack),
-        ] {
-            if let Slack::Penalty(lambda) = slack {
-                lambdas.push((field, lambda));
-            }
-        }
-        for (field, found) in lambdas {
-            if !(found.is_finite() && found > 0.0) {
-                return Err(SettingsError::Lambda { field, found });
-            }
-        }
-        let input_bounds = self
-            .input_bounds
-            .iter()
-            .map(|bounds| ("input_bounds", bounds));
-        for (index, (field, bounds)) in input_bounds.enumerate() {
-            check_bounds(field, index, bounds)?;
+        check_regularisation(&self.regularisation)?;
+        self.input_slack.check("input_slack")?;
+        self.output_slack.check("output_slack")?;
+        for (index, bounds) in self.input_bounds.iter().enumerate() {
+            check_bounds("input_bounds", index, bounds)?;
         }
         for (index, output) in self.output_bounds.iter().enumerate() {
             check_bounds("output_bounds", index, &output.bounds)?;
-            if let Some(penalty) = output.softness.penalty().filter(|p| !p.is_valid()) {
-                return Err(SettingsError::Penalty {
-                    index,
-                    linear: penalty.linear,
-                    quadratic: penalty.quadratic,
-                });
-            }
+            check_penalty("output_bounds.softness", index, output.softness)?;
         }
-        Ok(())
+        self.options.check(inputs, outputs, horizon)
     }
 }
 
-fn check_bounds(field: &'static str, index: usize, bounds: &Bounds) -> Result<(), SettingsError> {
+pub(super) fn check_regularisation(regularisation: &Regularisation) -> Result<(), SettingsError> {
+    let found = regularisation.lambda_g;
+    if regularisation.charges() && !(found.is_finite() && found > 0.0) {
+        return Err(SettingsError::Lambda {
+            field: "regularisation.lambda_g",
+            found,
+        });
+    }
+    if !regularisation.charges() && found != 0.0 {
+        return Err(SettingsError::UnusedLambda { found });
+    }
+    if let RegularisedPart::Gamma {
+        lambda_3: Some(found),
+    } = regularisation.part
+        && !(found.is_finite() && found > 0.0)
+    {
+        return Err(SettingsError::Lambda {
+            field: "regularisation.part.gamma.lambda_3",
+            found,
+        });
+    }
+    Ok(())
+}
+
+pub(super) fn check_penalty(
+    field: &'static str,
+    index: usize,
+    softness: Softness,
+) -> Result<(), SettingsError> {
+    match softness.penalty().filter(|penalty| !penalty.is_valid()) {
+        None => Ok(()),
+        Some(penalty) => Err(SettingsError::Penalty {
+            field,
+            index,
+            linear: penalty.linear,
+            quadratic: penalty.quadratic,
+        }),
+    }
+}
+
+pub(super) fn check_bounds(
+    field: &'static str,
+    index: usize,
+    bounds: &Bounds,
+) -> Result<(), SettingsError> {
     let (lower, upper) = (bounds.lower_value(), bounds.upper_value());
     let empty = lower > upper || lower == f64::INFINITY || upper == f64::NEG_INFINITY;
     if lower.is_nan() || upper.is_nan() || empty {

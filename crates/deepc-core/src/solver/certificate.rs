@@ -79,6 +79,11 @@ impl CertificateWork {
         }
     }
 
+    /// A x of the last point certified.
+    pub fn rows(&self) -> &[f64] {
+        &self.rows_x
+    }
+
     pub fn certify(
         &mut self,
         problem: &QpProblem,
@@ -112,18 +117,48 @@ impl CertificateWork {
             };
             rows.add(&row, problem.soft()[i]);
         }
-        let duality_gap = linalg::dot(&self.gradient, x).abs() + rows.gap;
-        let dual_residual = linalg::max_abs(&self.gradient).max(rows.stray_multiplier);
-        let objective = quadratic + linear + rows.penalty;
-        let cost_scale = (quadratic.abs() + linear.abs() + rows.penalty)
-            .max(largest_saving(&self.curvature, vectors.linear).min(1.0));
+        CostParts {
+            quadratic,
+            linear,
+            saving: largest_saving(&self.curvature, vectors.linear),
+            gradient: linalg::max_abs(&self.gradient),
+            gradient_scale,
+            gradient_gap: linalg::dot(&self.gradient, x).abs(),
+        }
+        .certificate(&rows)
+    }
+}
+
+/// What a certificate is made of beside the rows.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct CostParts {
+    /// ½xᵀPx.
+    pub quadratic: f64,
+    /// qᵀx.
+    pub linear: f64,
+    /// maxⱼ ½qⱼ²/Pⱼⱼ.
+    pub saving: f64,
+    /// ‖r‖∞ of r = Px + q + Aᵀμ.
+    pub gradient: f64,
+    /// The largest entry of the parts of r.
+    pub gradient_scale: f64,
+    /// |xᵀr|.
+    pub gradient_gap: f64,
+}
+
+impl CostParts {
+    pub fn certificate(&self, rows: &RowSums) -> Certificate {
+        let duality_gap = self.gradient_gap + rows.gap;
+        let dual_residual = self.gradient.max(rows.stray_multiplier);
+        let cost_scale =
+            (self.quadratic.abs() + self.linear.abs() + rows.penalty).max(self.saving.min(1.0));
         let relative = [
             rows.relative_violation,
-            ratio(dual_residual, gradient_scale),
+            ratio(dual_residual, self.gradient_scale),
             ratio(duality_gap, cost_scale),
         ];
         Certificate {
-            objective,
+            objective: self.quadratic + self.linear + rows.penalty,
             primal_residual: rows.violation,
             dual_residual,
             duality_gap,
@@ -158,15 +193,18 @@ fn ratio(part: f64, scale: f64) -> f64 {
     }
 }
 
-struct RowPoint {
-    value: f64,
-    lower: f64,
-    upper: f64,
-    multiplier: f64,
+/// One row at a point.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct RowPoint {
+    pub value: f64,
+    pub lower: f64,
+    pub upper: f64,
+    pub multiplier: f64,
 }
 
+/// What the rows add to a certificate.
 #[derive(Debug, Default)]
-struct RowSums {
+pub(super) struct RowSums {
     violation: f64,
     relative_violation: f64,
     stray_multiplier: f64,
@@ -175,7 +213,7 @@ struct RowSums {
 }
 
 impl RowSums {
-    fn add(&mut self, row: &RowPoint, soft: Option<super::SoftPenalty>) {
+    pub fn add(&mut self, row: &RowPoint, soft: Option<super::SoftPenalty>) {
         let violation = (row.value - row.upper).max(row.lower - row.value).max(0.0);
         let pushes_up = row.multiplier < 0.0;
         let bound = if pushes_up { row.lower } else { row.upper };

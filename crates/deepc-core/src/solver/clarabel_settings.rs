@@ -1,10 +1,10 @@
-//! Settings and helpers shared by the two forms of the Clarabel back end.
+//! Settings of the Clarabel back end and translations to and from its types.
 
 use clarabel::algebra::CscMatrix as ClarabelMatrix;
 use clarabel::solver::{DefaultSettings, SolverStatus};
 use serde::{Deserialize, Serialize};
 
-use super::error::SolverError;
+use super::error::{SolverError, check_tolerance};
 use super::{QpStatus, SolveBudget};
 
 /// Settings of the Clarabel back end.
@@ -29,14 +29,7 @@ impl ClarabelSettings {
     /// # Errors
     /// Names the field out of range.
     pub fn check(&self) -> Result<(), SolverError> {
-        if (1e-12..=1e-3).contains(&self.tolerance) {
-            return Ok(());
-        }
-        Err(SolverError::Setting {
-            field: "tolerance",
-            found: self.tolerance,
-            range: "a value from 1e-12 to 1e-3",
-        })
+        check_tolerance(self.tolerance)
     }
 
     /// Clarabel's own settings. Presolve and dropping of zeros are off because they forbid

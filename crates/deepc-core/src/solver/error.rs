@@ -50,7 +50,7 @@ pub enum SolverError {
     },
     /// The Hessian must be positive definite for this solver.
     #[error(
-        "the Hessian is not positive definite (pivot {pivot}); use `ClarabelDirect`, which allows semidefinite ones"
+        "the Hessian is not positive definite (pivot {pivot}); use `ClarabelSolver`, which allows semidefinite ones"
     )]
     NotPositiveDefinite {
         /// Row at which its Cholesky factorisation broke down.
@@ -85,4 +85,16 @@ pub enum SolverError {
         /// What is allowed.
         range: &'static str,
     },
+}
+
+/// The range of every back end's `tolerance`.
+pub(super) fn check_tolerance(found: f64) -> Result<(), SolverError> {
+    if (1e-12..=1e-3).contains(&found) {
+        return Ok(());
+    }
+    Err(SolverError::Setting {
+        field: "tolerance",
+        found,
+        range: "a value from 1e-12 to 1e-3",
+    })
 }

@@ -10,22 +10,29 @@
 //!
 //! P, A and the penalties (ρ, w) are constant; q, l and u change every step.
 
-mod active_rows;
+mod active_set;
+mod admm;
 mod certificate;
-mod clarabel_direct;
 mod clarabel_settings;
+mod clarabel_solver;
 pub mod contract;
 mod error;
+#[cfg(feature = "osqp")]
+mod osqp;
 mod problem;
+mod sizes;
 mod sparse_matrix;
 
 use std::time::Duration;
 
-pub use active_rows::ActiveRows;
+pub use active_set::{ActiveSet, ActiveSetSettings};
+pub use admm::{Admm, AdmmSettings};
 pub use certificate::{Certificate, INACCURATE_TOLERANCE, certify};
-pub use clarabel_direct::ClarabelDirect;
 pub use clarabel_settings::ClarabelSettings;
+pub use clarabel_solver::ClarabelSolver;
 pub use error::SolverError;
+#[cfg(feature = "osqp")]
+pub use osqp::{OsqpSettings, OsqpSolver};
 pub use problem::{QpMatrix, QpProblem, QpVectors, SoftPenalty};
 pub use sparse_matrix::CscMatrix;
 
@@ -68,12 +75,27 @@ impl QpStatus {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SolveBudget {
-    /// Iterations, in the solver's own kind (interior-point steps for Clarabel), all rounds
-    /// together. At least 1.
+    /// Iterations, in the solver's own kind: solves for the working set, each about as dear as
+    /// one change of it (`active-set`), products with the constant matrix (`admm`),
+    /// interior-point steps (`clarabel`). At least 1.
     pub max_iterations: u32,
-    /// Wall-clock time in seconds, above 0; infinity for no limit. Checked between iterations,
-    /// so one iteration more may pass.
+    /// Wall-clock time in seconds, above 0; infinity (absent in a file) for no limit. Checked
+    /// between iterations, so one iteration more may pass; an iteration in which many rows join
+    /// the working set of the project's own solvers takes k³/3 operations for k of them.
+    #[serde(default = "no_limit", skip_serializing_if = "is_no_limit")]
     pub max_time_s: f64,
+}
+
+fn no_limit() -> f64 {
+    f64::INFINITY
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde hands out references"
+)]
+fn is_no_limit(seconds: &f64) -> bool {
+    *seconds == f64::INFINITY
 }
 
 impl SolveBudget {
@@ -103,6 +125,8 @@ pub struct QpSolution {
     /// μ, one value per row, with Px + q + Aᵀμ = 0: positive where the upper side pushes,
     /// negative where the lower side does.
     pub dual: Vec<f64>,
+    /// A x, one value per row.
+    pub rows: Vec<f64>,
     /// Iterations used.
     pub iterations: u32,
     /// Wall-clock time used.
@@ -120,9 +144,19 @@ impl QpSolution {
             status: QpStatus::NotRun,
             primal: vec![f64::NAN; variables],
             dual: vec![f64::NAN; rows],
+            rows: vec![f64::NAN; rows],
             iterations: 0,
             time: Duration::ZERO,
             certificate: Certificate::none(),
+        }
+    }
+
+    /// Ends a solve as `status` says; what it took stays to be filled in.
+    pub(crate) fn end(&mut self, status: QpStatus) {
+        if status.is_usable() {
+            self.status = status;
+        } else {
+            self.fail(status);
         }
     }
 
@@ -131,7 +165,32 @@ impl QpSolution {
         self.status = status;
         self.primal.fill(f64::NAN);
         self.dual.fill(f64::NAN);
+        self.rows.fill(f64::NAN);
         self.certificate = Certificate::none();
+    }
+
+    /// Certifies the point it holds, and fills `rows`.
+    fn certify(
+        &mut self,
+        work: &mut certificate::CertificateWork,
+        problem: &QpProblem,
+        vectors: &QpVectors<'_>,
+    ) {
+        self.certificate = work.certify(problem, vectors, &self.primal, &self.dual);
+        self.rows.copy_from_slice(work.rows());
+    }
+
+    /// Ends a solve by the certificate of its point: `Solved` within `tolerance`, `Inaccurate`
+    /// within [`INACCURATE_TOLERANCE`], otherwise a breakdown.
+    fn grade(&self, tolerance: f64) -> QpStatus {
+        let relative = self.certificate.relative;
+        if relative <= tolerance {
+            QpStatus::Solved
+        } else if relative <= INACCURATE_TOLERANCE {
+            QpStatus::Inaccurate
+        } else {
+            QpStatus::NumericalError
+        }
     }
 }
 
@@ -143,8 +202,10 @@ impl QpSolution {
 ///    fail: how it ended is in [`QpSolution::status`].
 /// 2. **The problem is the one of [this module](self)**, with its sign and ½ conventions.
 ///    Bounds may be infinite; `l = u` is an equality row.
-/// 3. **`Solved` means certified**: the certificate is computed from the returned point and
+/// 3. **`Solved` means certified**: the certificate is computed by this crate, not taken from a
+///    foreign solver's word, agrees with [`certify`] of the returned point to rounding, and
 ///    meets the solver's tolerance. A point that misses it is `Inaccurate` or a failure.
+///    `rows` is A x of the point, to rounding.
 /// 4. **Bad numbers end in a status.** NaN anywhere, infinite q, l = +∞ or u = −∞ give
 ///    `InvalidData`; l > u gives `Infeasible`; never a panic, never NaN in a usable point.
 /// 5. **Wrong lengths are refused** by `update` with an error, and the old vectors stay.

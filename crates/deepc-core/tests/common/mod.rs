@@ -3,6 +3,7 @@
 
 use deepc_core::data::Dataset;
 use deepc_core::hankel::{HankelMatrix, Horizons, PersistentlyExciting};
+use deepc_core::program::{DeepcProgram, Plan};
 use faer::{Col, Mat};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -116,4 +117,29 @@ pub fn coloured_recording(samples: usize, seed: u64) -> (Mat<f64>, Mat<f64>) {
         outputs[(k, 0)] = position + 1e-3 * normal();
     }
     (inputs, outputs)
+}
+
+/// A plan with its objective.
+#[derive(Debug, Clone)]
+pub struct Solved {
+    plan: Plan,
+    pub objective: f64,
+}
+
+impl Solved {
+    /// The present plan of a program; NaN if it is not usable.
+    pub fn of(program: &dyn DeepcProgram) -> Self {
+        Self {
+            plan: program.plan().clone(),
+            objective: program.objective().unwrap_or(f64::NAN),
+        }
+    }
+}
+
+impl std::ops::Deref for Solved {
+    type Target = Plan;
+
+    fn deref(&self) -> &Plan {
+        &self.plan
+    }
 }

@@ -6,9 +6,9 @@ use deepc_core::data::Dataset;
 use deepc_core::hankel::{HankelMatrix, Horizons};
 use deepc_core::predictor::Predictor;
 use deepc_core::program::{
-    Bounds, CondensedProgram, DeepcProgram, DeepcSettings, OutputBounds, Slack,
+    Bounds, CondensedProgram, DeepcProgram, DeepcSettings, OutputBounds, ProgramOptions, Slack,
 };
-use deepc_core::solver::{ActiveRows, ClarabelSettings, SolveBudget};
+use deepc_core::solver::{ActiveSet, ActiveSetSettings, SolveBudget};
 
 use crate::scenario::{ControllerSettings, InputBounds, Method, Scenario};
 
@@ -40,12 +40,12 @@ pub fn controller(
         Method::RdDeepc => Predictor::exact(&exciting)?,
     };
     let program = CondensedProgram::new(&predictor, &deepc_settings(&scenario.bounds, settings))?;
-    let solver = ActiveRows::new(program.qp(), ClarabelSettings::default())?;
+    let solver = ActiveSet::new(program.qp(), ActiveSetSettings::default())?;
     let receding = RecedingHorizonSettings {
         moves_per_solve: settings.moves_per_solve,
         // Simulated time waits for the solver. A limit in wall-clock time would let the load of
         // the machine decide the outcome.
-        budget: SolveBudget::generous(),
+        ..RecedingHorizonSettings::every_sample(SolveBudget::generous())
     };
     Ok(Box::new(DeepcController::new(
         Box::new(program),
@@ -78,5 +78,6 @@ fn deepc_settings(bounds: &InputBounds, settings: &ControllerSettings) -> DeepcS
             penalty.linear,
             penalty.quadratic,
         )],
+        options: ProgramOptions::default(),
     }
 }

@@ -141,9 +141,11 @@ fn decide(
         Origin::Passthrough => SolveStatus::Passthrough,
         Origin::Unconstrained => SolveStatus::Unconstrained,
         Origin::Solver => SolveStatus::Solved,
+        Origin::SecondSolver => SolveStatus::SolvedBySecond,
         Origin::Plan => SolveStatus::Plan,
         Origin::Fallback => SolveStatus::FallbackPlan,
         Origin::Hold => SolveStatus::FallbackHold,
+        Origin::User => SolveStatus::FallbackUser,
     };
     Ok(Decision {
         input: [step.input[0], step.input[1]],

@@ -1,10 +1,10 @@
 //! The contract of [`QpSolver`] as checks that every back end runs.
 //!
 //! ```
-//! use deepc_core::solver::{ActiveRows, ClarabelSettings, contract};
+//! use deepc_core::solver::{ActiveSet, ActiveSetSettings, contract};
 //!
 //! contract::check_qp_solver(&mut |problem| {
-//!     Ok(Box::new(ActiveRows::new(problem, ClarabelSettings::default())?))
+//!     Ok(Box::new(ActiveSet::new(problem, ActiveSetSettings::default())?))
 //! })?;
 //! # Ok::<(), deepc_core::solver::contract::ContractViolation>(())
 //! ```
@@ -47,11 +47,42 @@ pub(crate) fn demand(
 /// Sets a back end up for a problem.
 pub type QpFactory<'a> = dyn FnMut(&QpProblem) -> Result<Box<dyn QpSolver>, SolverError> + 'a;
 
-/// Largest relative error of an objective against a known optimum.
-const OBJECTIVE_TOLERANCE: f64 = 1e-7;
+/// What a back end is held to.
+#[derive(Debug, Clone, Copy)]
+pub struct Terms<'a> {
+    /// Largest [`relative`](super::Certificate::relative) residual of a usable point, and largest
+    /// relative error of an objective against a known optimum.
+    pub residual: f64,
+    /// Names of programs of the corpus that it need not solve. It must still say so: a usable
+    /// point or another ending than the expected one remains a breach.
+    pub excused: &'a [&'a str],
+}
+
+impl Default for Terms<'_> {
+    /// A residual of 1e-7, and no excuse.
+    fn default() -> Self {
+        Self {
+            residual: 1e-7,
+            excused: &[],
+        }
+    }
+}
+
+impl Terms<'_> {
+    fn excuse(&self, case: &CorpusProblem, status: QpStatus) -> bool {
+        let failed = matches!(
+            status,
+            QpStatus::IterationLimit | QpStatus::TimeLimit | QpStatus::NumericalError
+        );
+        failed && self.excused.contains(&case.name)
+    }
+}
 
 /// Largest error of a variable against a known optimum, relative to max(1, its size).
 const PRIMAL_TOLERANCE: f64 = 1e-4;
+
+/// How far the certificate and the rows a solver returns may be from those of its point.
+const CERTIFICATE_ROUNDING: f64 = 1e-9;
 
 /// Runs all checks on the solvers `factory` makes. A back end that needs a positive definite
 /// Hessian may refuse the problems of the corpus that are only semidefinite, with
@@ -60,16 +91,27 @@ const PRIMAL_TOLERANCE: f64 = 1e-4;
 /// # Errors
 /// The first clause found broken.
 pub fn check_qp_solver(factory: &mut QpFactory<'_>) -> Result<(), ContractViolation> {
+    check_qp_solver_on(factory, &Terms::default())
+}
+
+/// [`check_qp_solver`] on terms of its own, for a back end that is less accurate by nature.
+///
+/// # Errors
+/// The first clause found broken.
+pub fn check_qp_solver_on(
+    factory: &mut QpFactory<'_>,
+    terms: &Terms<'_>,
+) -> Result<(), ContractViolation> {
     for case in corpus() {
         let Some(mut solver) = set_up(factory, &case)? else {
             continue;
         };
-        check_optimum(&case, solver.as_mut())?;
+        check_optimum(&case, solver.as_mut(), terms)?;
     }
-    check_bad_numbers(factory)?;
+    check_bad_numbers(factory, terms)?;
     check_lengths(factory)?;
     check_budgets(factory)?;
-    check_history(factory)
+    check_history(factory, terms)
 }
 
 fn set_up(
@@ -98,16 +140,23 @@ fn solve(
     Ok(solver.solve(budget).clone())
 }
 
-fn check_optimum(case: &CorpusProblem, solver: &mut dyn QpSolver) -> Result<(), ContractViolation> {
+fn check_optimum(
+    case: &CorpusProblem,
+    solver: &mut dyn QpSolver,
+    terms: &Terms<'_>,
+) -> Result<(), ContractViolation> {
     let name = case.name;
     let solution = solve(solver, case.vectors(), &SolveBudget::generous())?;
     let status = solution.status;
+    if terms.excuse(case, status) {
+        return Ok(());
+    }
     match &case.expected {
         Expected::Status(expected) => demand(2, status == *expected, || {
             format!("`{name}` ends with {status:?}, expected {expected:?}")
         }),
         Expected::Optimum { primal, objective } => {
-            check_certificate(case, &solution)?;
+            check_certificate(case, &solution, terms)?;
             let found = solution.certificate.objective;
             // An optimum without a cost is held to the cost's unit.
             let size = if *objective == 0.0 {
@@ -116,7 +165,7 @@ fn check_optimum(case: &CorpusProblem, solver: &mut dyn QpSolver) -> Result<(), 
                 objective.abs()
             };
             let error = (found - objective).abs() / size;
-            demand(2, error <= OBJECTIVE_TOLERANCE, || {
+            demand(2, error <= terms.residual, || {
                 format!("`{name}` has objective {found}, expected {objective}")
             })?;
             let far = solution.primal.iter().zip(primal).any(|(found, expected)| {
@@ -132,14 +181,19 @@ fn check_optimum(case: &CorpusProblem, solver: &mut dyn QpSolver) -> Result<(), 
                 )
             })
         }
-        Expected::Certified => check_certificate(case, &solution),
+        Expected::Certified => check_certificate(case, &solution, terms),
     }
 }
 
 /// Clause 3: the certificate is that of the point, and good.
-fn check_certificate(case: &CorpusProblem, solution: &QpSolution) -> Result<(), ContractViolation> {
+fn check_certificate(
+    case: &CorpusProblem,
+    solution: &QpSolution,
+    terms: &Terms<'_>,
+) -> Result<(), ContractViolation> {
     let name = case.name;
-    demand(2, solution.status == QpStatus::Solved, || {
+    // Not by the status: a penalty of 1e8 makes 1e-8 of a rounding of 1e-16.
+    demand(2, solution.status.is_usable(), || {
         format!(
             "`{name}` ends with {:?} instead of an optimum",
             solution.status
@@ -151,22 +205,46 @@ fn check_certificate(case: &CorpusProblem, solution: &QpSolution) -> Result<(), 
         &solution.primal,
         &solution.dual,
     );
-    demand(3, certificate == solution.certificate, || {
-        format!(
-            "`{name}`: certificate {:?}, its point has {certificate:?}",
-            solution.certificate
-        )
+    let told = &solution.certificate;
+    let objective_error = (told.objective - certificate.objective).abs();
+    let agrees = (told.relative - certificate.relative).abs() <= CERTIFICATE_ROUNDING
+        && objective_error <= CERTIFICATE_ROUNDING * certificate.objective.abs().max(1e-6);
+    demand(3, agrees, || {
+        format!("`{name}`: certificate {told:?}, its point has {certificate:?}")
     })?;
-    demand(3, certificate.relative <= 1e-6, || {
+    demand(3, certificate.relative <= terms.residual, || {
         format!(
             "`{name}` is called solved with a residual of {:e}",
             certificate.relative
+        )
+    })?;
+    check_rows(case, solution)
+}
+
+/// Clause 3: `rows` is A x.
+fn check_rows(case: &CorpusProblem, solution: &QpSolution) -> Result<(), ContractViolation> {
+    let mut differences = solution.rows.clone();
+    let mut sizes: Vec<f64> = differences.iter().map(|value| value.abs()).collect();
+    for (i, j, entry) in case.problem.rows().triplets() {
+        differences[i] -= entry * solution.primal[j];
+        sizes[i] += (entry * solution.primal[j]).abs();
+    }
+    let mut pairs = differences.iter().zip(&sizes);
+    let wrong = pairs.position(|(d, size)| d.is_nan() || d.abs() > CERTIFICATE_ROUNDING * size);
+    demand(3, wrong.is_none(), || {
+        let i = wrong.unwrap_or_default();
+        format!(
+            "`{}`: rows[{i}] is {}, A x differs by {:e}",
+            case.name, solution.rows[i], differences[i]
         )
     })
 }
 
 /// Clause 4.
-fn check_bad_numbers(factory: &mut QpFactory<'_>) -> Result<(), ContractViolation> {
+fn check_bad_numbers(
+    factory: &mut QpFactory<'_>,
+    terms: &Terms<'_>,
+) -> Result<(), ContractViolation> {
     let case = moving_problem(0);
     let Some(mut solver) = set_up(factory, &case)? else {
         return Ok(());
@@ -207,7 +285,7 @@ fn check_bad_numbers(factory: &mut QpFactory<'_>) -> Result<(), ContractViolatio
             format!("q = {linear}, l = {lower}, u = {upper} ends with {status:?}, not {expected:?}")
         })?;
         // And it is not remembered.
-        check_optimum(&case, solver.as_mut())?;
+        check_optimum(&case, solver.as_mut(), terms)?;
     }
     Ok(())
 }
@@ -284,7 +362,7 @@ fn check_budgets(factory: &mut QpFactory<'_>) -> Result<(), ContractViolation> {
 }
 
 /// Clauses 7 and 8.
-fn check_history(factory: &mut QpFactory<'_>) -> Result<(), ContractViolation> {
+fn check_history(factory: &mut QpFactory<'_>, terms: &Terms<'_>) -> Result<(), ContractViolation> {
     let first = moving_problem(0);
     let (Some(mut warm), Some(mut twin)) = (set_up(factory, &first)?, set_up(factory, &first)?)
     else {
@@ -295,7 +373,7 @@ fn check_history(factory: &mut QpFactory<'_>) -> Result<(), ContractViolation> {
         let budget = SolveBudget::generous();
         let continued = solve(warm.as_mut(), case.vectors(), &budget)?;
         let repeated = solve(twin.as_mut(), case.vectors(), &budget)?;
-        check_certificate(&case, &continued)?;
+        check_certificate(&case, &continued, terms)?;
         demand(8, continued.primal == repeated.primal, || {
             format!("step {step}: equal histories give different points")
         })?;
@@ -311,5 +389,5 @@ fn check_history(factory: &mut QpFactory<'_>) -> Result<(), ContractViolation> {
     }
     warm.forget();
     let cleared = solve(warm.as_mut(), first.vectors(), &SolveBudget::generous())?;
-    check_certificate(&first, &cleared)
+    check_certificate(&first, &cleared, terms)
 }

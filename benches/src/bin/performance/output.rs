@@ -1,0 +1,26 @@
+//! Files, whole or not at all.
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use serde::Serialize;
+
+pub fn create_folder(path: &Path) -> Result<()> {
+    std::fs::create_dir_all(path)
+        .with_context(|| format!("cannot create the folder {}", path.display()))
+}
+
+/// Writes beside the target first and renames, so that nothing ever leaves half a file.
+pub fn write_whole(path: &Path, contents: &str) -> Result<()> {
+    let partial = path.with_added_extension("partial");
+    let written = std::fs::write(&partial, contents).and_then(|()| std::fs::rename(&partial, path));
+    written.with_context(|| {
+        // A leftover is all that a failed removal can cost.
+        let _ = std::fs::remove_file(&partial);
+        format!("cannot write {}", path.display())
+    })
+}
+
+pub fn write_json<T: Serialize + ?Sized>(path: &Path, value: &T) -> Result<()> {
+    write_whole(path, &(serde_json::to_string_pretty(value)? + "\n"))
+}
