@@ -16,12 +16,13 @@ const ARROWS: [(&str, &[&str]); 4] = [
 ];
 
 /// The stages of a crate in the order of the data flow: a stage imports only earlier ones.
-const DEEPC_STAGES: [&str; 6] = [
+const DEEPC_STAGES: [&str; 7] = [
     "data",
     "hankel",
     "predictor",
     "solver",
     "program",
+    "assessment",
     "controller",
 ];
 

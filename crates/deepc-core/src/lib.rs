@@ -41,6 +41,7 @@
 //! | [`predictor`] | exciting data | [`predictor::Predictor`]: whole, reduced, from a long recording, kept up to date |
 //! | [`program`] | a predictor, weights and bounds | [`program::CondensedProgram`], [`program::SparseProgram`] |
 //! | [`solver`] | the program's quadratic program | a [`solver::QpSolver`] |
+//! | [`assessment`] | a data set, before control | [`assessment::DataReport`], [`assessment::TuningCurve`] |
 //! | [`controller`] | program and solver | [`controller::DeepcController`] |
 //!
 //! Everything up to the solver's set-up happens once, may fail and says why. A control step
@@ -128,6 +129,7 @@
 /// The linear algebra crate whose matrices this one takes and gives.
 pub use faer;
 
+pub mod assessment;
 pub mod controller;
 pub mod data;
 pub mod hankel;
