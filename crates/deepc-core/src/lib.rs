@@ -137,3 +137,8 @@ mod linalg;
 pub mod predictor;
 pub mod program;
 pub mod solver;
+
+/// The code of the guide to a new plant, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/adding-a-plant.md")]
+struct AddingAPlant;
