@@ -1,6 +1,7 @@
 //! Dense kernels on slices. They allocate nothing and run on one thread.
 
 use faer::linalg::matmul::matmul;
+use faer::linalg::solvers::Qr;
 use faer::linalg::triangular_solve::{
     solve_lower_triangular_in_place, solve_upper_triangular_in_place,
 };
@@ -53,6 +54,19 @@ pub(crate) fn part_outside(span: MatRef<'_, f64>, x: &mut [f64], coordinates: &m
     let unit = (x.len() as f64).sqrt();
     // A NaN is not below the unit.
     dot(x, x).sqrt() / if size < unit { unit } else { size }
+}
+
+/// QR decomposition of `aᵀ`, its columns (the rows of `a`) taken in `order` first and then as they
+/// stand. Rows of zeros, which change nothing, make the triangular factor square.
+pub(crate) fn qr_of_rows(a: MatRef<'_, f64>, order: &[usize]) -> Qr<f64> {
+    let (rows, columns) = a.shape();
+    let mut transposed = Mat::zeros(columns.max(rows), rows);
+    for j in 0..rows {
+        let source = a.row(order.get(j).copied().unwrap_or(j));
+        let target = transposed.col_mut(j).iter_mut().zip(source.iter());
+        target.for_each(|(entry, &value)| *entry = value);
+    }
+    transposed.qr()
 }
 
 /// Rᵀ as a lower triangular matrix with clean zeros, for the upper trapezoidal `r` (k×n, k ≥ n).

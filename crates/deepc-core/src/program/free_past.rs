@@ -66,12 +66,8 @@ impl FreePast {
         let known = compliance.len();
         let future = rows - known;
         let scales = predictor.row_scales()[..known].to_vec();
-        let mut transposed = Mat::zeros(h.ncols().max(rows), rows);
-        for j in 0..rows {
-            let target = transposed.col_mut(j).iter_mut();
-            target.zip(h.row(j).iter()).for_each(|(t, &s)| *t = s);
-        }
-        let r = transposed.qr().thin_R().to_owned();
+        let data = linalg::qr_of_rows(h, &[]);
+        let r = data.thin_R();
 
         let top = Mat::from_fn(known, known, |i, j| {
             if i <= j { r[(i, j)] / scales[j] } else { 0.0 }

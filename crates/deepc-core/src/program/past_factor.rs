@@ -106,17 +106,7 @@ impl PastFactor {
         let hard = order.len();
         order.extend_from_slice(&soft);
         let slack_roots: Vec<_> = soft.iter().map(|&i| compliance[i].sqrt()).collect();
-        // Rows of zeros change nothing and make the triangular factor square.
-        let mut transposed = Mat::zeros(data_columns.max(rows), rows);
-        for j in 0..rows {
-            let source = h.row(order.get(j).copied().unwrap_or(j));
-            let target = transposed.col_mut(j);
-            target
-                .iter_mut()
-                .zip(source.iter())
-                .for_each(|(entry, &value)| *entry = value);
-        }
-        let data = transposed.qr();
+        let data = linalg::qr_of_rows(h, &order);
         let lambda_g_root = lambda_g.sqrt();
         let r = Mat::from_fn(rows, rows, |i, j| {
             if i <= j {
