@@ -8,8 +8,12 @@ mod plants;
 
 use allocation_counter::measure;
 use deepc_core::controller::{Controller, DeepcController, RecedingHorizonSettings, Reference};
-use deepc_core::program::{CondensedProgram, DeepcProgram};
-use deepc_core::solver::{ActiveSet, ActiveSetSettings, Admm, AdmmSettings, SolveBudget};
+use deepc_core::program::{
+    AffineConstraint, Bounds, CondensedProgram, DeepcProgram, ProgramOptions, Softness, Steps,
+};
+use deepc_core::solver::{
+    ActiveSet, ActiveSetSettings, Admm, AdmmSettings, SoftPenalty, SolveBudget,
+};
 use plants::{controller_from, disturbed_predictor, horizon, predictor, settings};
 
 /// Two hundred samples with every kind of fault; what they allocate.
@@ -60,6 +64,24 @@ fn a_step_allocates_nothing() {
         .iter()
         .map(controller_from)
         .collect();
+    // Rate limits, a cost of changes and an affine constraint.
+    let mut limited = settings();
+    limited.options = ProgramOptions {
+        input_change_weights: vec![0.1; 2],
+        input_change_bounds: vec![Bounds::between(-0.2, 0.2); 2],
+        affine: vec![AffineConstraint {
+            inputs: vec![1.0, 1.0],
+            outputs: vec![0.0, 0.5],
+            bounds: Bounds::between(-1.0, 1.0),
+            softness: Softness::Soft(SoftPenalty {
+                linear: 10.0,
+                quadratic: 1.0,
+            }),
+            steps: Steps::All,
+        }],
+        ..ProgramOptions::default()
+    };
+    controllers.push(DeepcController::condensed(&predictor(), &limited, horizon(1)).unwrap());
     // A first solver that gives up at once, and a second one.
     let program = CondensedProgram::new(&predictor(), &settings()).unwrap();
     let first = ActiveSet::new(program.qp(), ActiveSetSettings::default()).unwrap();
