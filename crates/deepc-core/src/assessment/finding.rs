@@ -233,10 +233,15 @@ pub(super) fn channel_findings(
     findings
 }
 
-/// Findings about the excitation of order L + n.
-pub(super) fn excitation_findings(report: &ExcitationReport) -> Vec<Finding> {
-    let order = report.window.saturating_add(report.plant_order);
-    let finding = |kind, severity, (found, allowed), message, remedy: &str| Finding {
+/// A finding about the data as a whole.
+fn about_data(
+    kind: FindingKind,
+    severity: Severity,
+    (found, allowed): (f64, f64),
+    message: String,
+    remedy: &str,
+) -> Finding {
+    Finding {
         kind,
         severity,
         channels: Vec::new(),
@@ -244,9 +249,14 @@ pub(super) fn excitation_findings(report: &ExcitationReport) -> Vec<Finding> {
         found,
         allowed,
         remedy: remedy.into(),
-    };
+    }
+}
+
+/// Findings about the excitation of order L + n.
+pub(super) fn excitation_findings(report: &ExcitationReport) -> Vec<Finding> {
+    let order = report.window.saturating_add(report.plant_order);
     if report.columns < report.columns_needed {
-        return vec![finding(
+        return vec![about_data(
             FindingKind::TooFewSamples,
             Severity::Error,
             (report.columns as f64, report.columns_needed as f64),
@@ -261,7 +271,7 @@ pub(super) fn excitation_findings(report: &ExcitationReport) -> Vec<Finding> {
         )];
     }
     if !report.is_persistently_exciting() {
-        let mut poor = finding(
+        let mut poor = about_data(
             FindingKind::NotExciting,
             Severity::Error,
             (report.input_rank as f64, report.input_rank_needed as f64),
@@ -282,7 +292,7 @@ pub(super) fn excitation_findings(report: &ExcitationReport) -> Vec<Finding> {
     if ratio >= WEAK_EXCITATION {
         return Vec::new();
     }
-    vec![finding(
+    vec![about_data(
         FindingKind::WeakExcitation,
         Severity::Warning,
         (ratio, WEAK_EXCITATION),
@@ -366,17 +376,8 @@ pub(super) fn order_findings(
     bound: usize,
     past: usize,
 ) -> Vec<Finding> {
-    let finding = |kind, severity, (found, allowed), message, remedy: &str| Finding {
-        kind,
-        severity,
-        channels: Vec::new(),
-        message,
-        found,
-        allowed,
-        remedy: remedy.into(),
-    };
     let Some(estimate) = estimate else {
-        return vec![finding(
+        return vec![about_data(
             FindingKind::OrderUnknown,
             Severity::Info,
             (0.0, 0.0),
@@ -386,7 +387,7 @@ pub(super) fn order_findings(
     };
     let mut findings = Vec::new();
     if estimate.order > bound {
-        findings.push(finding(
+        findings.push(about_data(
             FindingKind::OrderAboveBound,
             Severity::Warning,
             (estimate.order as f64, bound as f64),
@@ -398,7 +399,7 @@ pub(super) fn order_findings(
         ));
     }
     if past < estimate.lag && estimate.certainty > Certainty::Unsure {
-        findings.push(finding(
+        findings.push(about_data(
             FindingKind::PastTooShort,
             Severity::Warning,
             (past as f64, estimate.lag as f64),

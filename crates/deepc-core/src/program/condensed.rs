@@ -137,12 +137,16 @@ impl CondensedProgram {
         }
     }
 
-    fn optimum_is_finite(&self) -> bool {
-        self.optimum.iter().all(|value| value.is_finite())
-    }
-
-    fn past_is_consistent(&self) -> bool {
-        self.common.plan.past_inconsistency <= CONSISTENCY_TOLERANCE
+    /// Why there is no plan whatever a solver says, if there is none.
+    fn refusal(&self) -> Option<QpStatus> {
+        let finite = self.optimum.iter().all(|value| value.is_finite());
+        let consistent = self.common.plan.past_inconsistency <= CONSISTENCY_TOLERANCE;
+        match (finite, consistent) {
+            // Without a constraint no solver would notice.
+            (false, _) => Some(QpStatus::InvalidData),
+            (true, false) => Some(QpStatus::Infeasible),
+            (true, true) => None,
+        }
     }
 
     /// G of the unconstrained optimum f* = (I − GW)Φz + GW r, (m+p)N×(m+p)N, rows and columns
@@ -183,10 +187,9 @@ impl CondensedProgram {
         x
     }
 
-    /// What g and the slacks of the present plan cost.
-    fn model_cost(&self) -> f64 {
+    /// What g and the slacks of the present plan cost, from its coordinates x.
+    fn model_cost(&self, x: &[f64]) -> f64 {
         let charged = self.elimination.map().charged.ncols();
-        let x = self.coordinates();
         let zeta = &x[..charged];
         self.elimination.known_cost(&self.common) + linalg::dot(zeta, zeta)
     }
@@ -242,10 +245,7 @@ impl DeepcProgram for CondensedProgram {
     }
 
     fn plan_unconstrained(&mut self) -> bool {
-        if !self.optimum_is_finite()
-            || !self.past_is_consistent()
-            || !self.common.rows.are_met(&self.optimum, BOUND_TOLERANCE)
-        {
+        if self.refusal().is_some() || !self.common.rows.are_met(&self.optimum, BOUND_TOLERANCE) {
             return false;
         }
         self.s.fill(0.0);
@@ -256,25 +256,17 @@ impl DeepcProgram for CondensedProgram {
     }
 
     fn refuse_past(&mut self) -> bool {
-        // Without a constraint no solver would notice.
-        let ending = if !self.optimum_is_finite() {
-            Ending::refused(QpStatus::InvalidData)
-        } else if !self.past_is_consistent() {
-            Ending::refused(QpStatus::Infeasible)
-        } else {
-            return false;
-        };
-        self.common.reject(ending);
-        true
+        let refusal = self.refusal();
+        if let Some(status) = refusal {
+            self.common.reject(Ending::refused(status));
+        }
+        refusal.is_some()
     }
 
     fn accept(&mut self, solution: &QpSolution) {
         let mut ending = Ending::of(solution);
-        if !self.past_is_consistent() {
-            ending.status = QpStatus::Infeasible;
-        }
-        if !self.optimum_is_finite() {
-            ending.status = QpStatus::InvalidData;
+        if let Some(status) = self.refusal() {
+            ending.status = status;
         }
         let fits = solution.primal.len() == self.s.len() && solution.rows.len() == self.lower.len();
         if ending.status.is_usable() && !fits {
@@ -296,7 +288,7 @@ impl DeepcProgram for CondensedProgram {
     fn objective(&self) -> Option<f64> {
         let plan = &self.common.plan;
         plan.is_usable()
-            .then(|| plan.tracking + plan.soft_penalty + self.model_cost())
+            .then(|| plan.tracking + plan.soft_penalty + self.model_cost(&self.coordinates()))
     }
 
     fn recover(&self) -> Option<Recovered> {
@@ -317,7 +309,7 @@ impl DeepcProgram for CondensedProgram {
                 let past = known.iter().zip(&slack).map(|(z, slack)| z + slack);
                 let target: Vec<_> = past.chain(self.future.iter().copied()).collect();
                 let (inputs, outputs) = self.common.slack_costs(&slack);
-                let rest = (self.model_cost() - inputs - outputs).max(0.0);
+                let rest = (self.model_cost(&x) - inputs - outputs).max(0.0);
                 (least_norm(free.predictor(), &target)?, slack, rest)
             }
         };

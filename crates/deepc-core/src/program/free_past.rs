@@ -18,13 +18,10 @@ use faer::{Mat, MatRef, Par};
 
 use super::error::ProgramError;
 use super::future_map::FutureMap;
+use super::past_factor::SPAN_TOLERANCE;
 use super::regularisation::{Regularisation, RegularisedPart};
 use crate::linalg;
 use crate::predictor::Predictor;
-
-/// Directions of the known part that the data reach with less than this fraction of the
-/// strongest (channels scaled) count as not reached. Rounding leaves about 1e-14.
-const SPAN_TOLERANCE: f64 = 1e-12;
 
 /// Directions of the future below this fraction of the known part's strongest (channels scaled)
 /// are rounding, where nothing charges them.

@@ -52,7 +52,7 @@ impl Gain {
         let mut on_coordinates =
             &directions * least_squares.start_response(cost, map.known.as_ref());
         on_coordinates += &map.known;
-        let weighted: Vec<_> = (0..n).filter(|&i| cost.weights[i] > 0.0).collect();
+        let weighted = cost.weighted();
         let pulls = &directions * least_squares.pull_response(cost, &weighted);
         let newest: Vec<_> = cost.newest_inputs().map(|(_, source, _)| source).collect();
 
@@ -189,7 +189,6 @@ impl LeastSquares {
 
     /// x from the weighted references and u(−1).
     fn pull_response(&self, cost: &StageCost, weighted: &[usize]) -> Mat<f64> {
-        // The weights of W come first among the rows of its root.
         let references = weighted.iter().enumerate();
         let references = references.map(|(row, &i)| (row, cost.weights[i].sqrt()));
         let newest = cost.newest_inputs();

@@ -40,7 +40,7 @@ use crate::predictor::Predictor;
 
 /// Pasts that the data reach with less than this fraction of their strongest direction (channels
 /// scaled), or of the entry itself, count as not spanned. Rounding leaves about 1e-14.
-const SPAN_TOLERANCE: f64 = 1e-12;
+pub(super) const SPAN_TOLERANCE: f64 = 1e-12;
 
 /// A pivot of an entry with slack below this fraction of its column is rounding: 1/√λ is lost in
 /// the data.

@@ -1,6 +1,6 @@
 //! The constraints on the stacked future f = col(u, y), as rows of a quadratic program.
 
-use super::options::{AffineConstraint, Terminal};
+use super::options::{AffineConstraint, Steps, Terminal};
 use super::settings::{Bounds, DeepcSettings};
 use crate::hankel::{Shape, stacked_position};
 use crate::solver::SoftPenalty;
@@ -140,8 +140,8 @@ impl ConstraintRows {
     }
 
     fn add_terminal(&mut self, shape: Shape, terminal: &Terminal) {
-        let steps = shape.horizons.future;
-        for time in steps.saturating_sub(terminal.steps)..steps {
+        let range = Steps::Last(terminal.steps).range(shape.horizons.future);
+        for time in range.unwrap_or_default() {
             let inputs = (0..shape.inputs).map(|i| input_position(shape, time, i));
             let outputs = (0..shape.outputs).map(|i| output_position(shape, time, i));
             for position in inputs.chain(outputs) {

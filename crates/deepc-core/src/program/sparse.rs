@@ -9,14 +9,10 @@ use super::plan::{Moment, Plan, Recovered};
 use super::recover::recovered;
 use super::regularisation::RegularisedPart;
 use super::settings::DeepcSettings;
-use crate::hankel::Shape;
+use crate::hankel::{RANK_TOLERANCE, Shape};
 use crate::linalg;
 use crate::predictor::{Predictor, ReductionMethod};
 use crate::solver::{CscMatrix, QpMatrix, QpProblem, QpSolution, QpStatus, QpVectors, SoftPenalty};
-
-/// Rows of the data below this fraction of the strongest (scaled) count as dependent when the
-/// projection Π is formed.
-const RANK_TOLERANCE: f64 = 1e-10;
 
 /// The `DeePC` problem with all its variables x = (g, u, y, σ), σ only where slack is allowed:
 ///

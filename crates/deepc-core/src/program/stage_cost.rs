@@ -92,11 +92,16 @@ impl StageCost {
         entries
     }
 
-    /// The rows of √cost·X for a matrix X with one row per entry of f, but for rows of zeros.
+    /// Entries of f that W weighs.
+    pub fn weighted(&self) -> Vec<usize> {
+        let entries = 0..self.weights.len();
+        entries.filter(|&i| self.weights[i] > 0.0).collect()
+    }
+
+    /// The rows of √cost·X for a matrix X with one row per entry of f, but for rows of zeros: those
+    /// of [`weighted`](Self::weighted), then those of the changes.
     pub fn root_times(&self, x: MatRef<'_, f64>) -> Mat<f64> {
-        let weighted: Vec<_> = (0..self.weights.len())
-            .filter(|&i| self.weights[i] > 0.0)
-            .collect();
+        let weighted = self.weighted();
         let changes: Vec<_> = self.changes().collect();
         Mat::from_fn(weighted.len() + changes.len(), x.ncols(), |i, j| {
             match i.checked_sub(weighted.len()) {

@@ -14,7 +14,7 @@ use std::time::Instant;
 
 pub use settings::OsqpSettings;
 
-use super::certificate::{CertificateWork, INACCURATE_TOLERANCE};
+use super::certificate::CertificateWork;
 use super::clarabel_settings::Remaining;
 use super::error::SolverError;
 use super::problem::{OwnedVectors, QpProblem, QpVectors, Screening};
@@ -111,13 +111,9 @@ impl OsqpSolver {
         self.native.unload(&mut solution.primal, &mut solution.dual);
         let vectors = self.vectors.as_ref();
         solution.certify(&mut self.certificate_work, &self.problem, &vectors);
-        let relative = solution.certificate.relative;
-        if relative <= self.settings.tolerance {
-            QpStatus::Solved
-        } else if relative <= INACCURATE_TOLERANCE {
-            QpStatus::Inaccurate
-        } else {
-            failure
+        match solution.grade(self.settings.tolerance) {
+            QpStatus::NumericalError => failure,
+            usable => usable,
         }
     }
 }
