@@ -8,7 +8,7 @@ use benches::case::{Activity, Case};
 use benches::replay::Replay;
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use deepc_core::hankel::HankelMatrix;
-use deepc_core::program::{CondensedProgram, DeepcProgram, Plan, SparseProgram};
+use deepc_core::program::{CondensedProgram, Plan, PredictiveProgram, SparseProgram};
 use deepc_core::solver::{QpSolver, SolveBudget};
 
 /// Steps of one sample; consecutive, so that a warm start is worth what it is in control.
@@ -41,7 +41,7 @@ fn set_up(criterion: &mut Criterion) {
 }
 
 fn steps(
-    program: &mut dyn DeepcProgram,
+    program: &mut dyn PredictiveProgram,
     solver: &mut dyn QpSolver,
     replay: &Replay,
     range: std::ops::Range<usize>,
@@ -88,7 +88,7 @@ fn formulations(criterion: &mut Criterion) {
     let mut solver = solver.expect("the Hessian is positive definite");
     let replay = Replay::record(&case, &mut program, solver.as_mut(), STEPS);
     let written = |predictor| SparseProgram::new(predictor, &settings).expect("they are valid");
-    let programs: [(&str, Box<dyn DeepcProgram>); 3] = [
+    let programs: [(&str, Box<dyn PredictiveProgram>); 3] = [
         ("condensed", Box::new(condensed())),
         ("rd", Box::new(written(&reduced))),
         ("full", Box::new(written(&full))),

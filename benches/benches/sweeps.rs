@@ -6,7 +6,7 @@ use benches::backend::{self, ACTIVE_SET};
 use benches::case::{Activity, Case};
 use benches::replay::Replay;
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use deepc_core::program::{CondensedProgram, DeepcProgram, Plan};
+use deepc_core::program::{CondensedProgram, Plan, PredictiveProgram};
 use deepc_core::solver::SolveBudget;
 
 const STEPS: usize = 50;

@@ -7,6 +7,10 @@ use deepc_core::program::{
     Bounds, DeepcSettings, OutputBounds, ProgramOptions, Regularisation, Slack,
 };
 
+use faer::Mat;
+use sysid::lmpc::LmpcSettings;
+use sysid::{Channel, StateSpace, SystemMatrices};
+
 use crate::plant::Plant;
 
 /// Sample time of every recording here, in seconds.
@@ -131,6 +135,67 @@ impl Case {
             input_bounds: input_bounds.collect(),
             output_bounds: vec![OutputBounds::soft(-limit, limit, 1e5, 1e6); self.outputs],
             options: ProgramOptions::default(),
+        }
+    }
+
+    /// The linear part of the plant, as an identification that errs nowhere would give it: order 2p.
+    ///
+    /// # Panics
+    /// Never: the matrices fit.
+    #[must_use]
+    pub fn model(&self) -> StateSpace {
+        let (m, p) = (self.inputs, self.outputs);
+        let gains = Mat::from_fn(p, m, Plant::gain);
+        let [recent, before] = Plant::MEMORY;
+        let matrices = SystemMatrices {
+            a: Mat::from_fn(2 * p, 2 * p, |i, j| {
+                match (i % 2, j.checked_sub(i - i % 2)) {
+                    (0, Some(0)) => recent,
+                    (0, Some(1)) => before,
+                    (1, Some(0)) => 1.0,
+                    _ => 0.0,
+                }
+            }),
+            b: Mat::from_fn(
+                2 * p,
+                m,
+                |i, j| if i % 2 == 0 { gains[(i / 2, j)] } else { 0.0 },
+            ),
+            c: Mat::from_fn(p, 2 * p, |i, j| match j.checked_sub(2 * i) {
+                Some(0) => recent,
+                Some(1) => before,
+                _ => 0.0,
+            }),
+            d: gains,
+            k: Mat::from_fn(2 * p, p, |i, j| if i / 2 == j { 0.2 } else { 0.0 }),
+        };
+        let channel = |name: String, offset, scale| Channel {
+            name,
+            offset,
+            scale,
+        };
+        let inputs = (0..m).map(|j| {
+            let scale = if j == 1 { 1.0 } else { 35.0 };
+            channel(format!("u{}", j + 1), Plant::rest(j), scale)
+        });
+        let outputs = (0..p).map(|i| channel(format!("y{}", i + 1), 0.0, 1.0));
+        StateSpace::new(
+            SAMPLE_TIME_S,
+            inputs.collect(),
+            Vec::new(),
+            outputs.collect(),
+            matrices,
+        )
+        .expect("the matrices fit")
+    }
+
+    /// The costs and bounds of [`settings`](Self::settings) for a linear MPC that starts from the
+    /// same window.
+    #[must_use]
+    pub fn lmpc_settings(&self) -> LmpcSettings {
+        LmpcSettings {
+            past_steps: Some(self.horizons.past),
+            ..LmpcSettings::from(&self.settings())
         }
     }
 

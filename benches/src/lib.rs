@@ -6,5 +6,7 @@
 
 pub mod backend;
 pub mod case;
+pub mod output;
 pub mod plant;
 pub mod replay;
+pub mod synthetic;

@@ -23,6 +23,19 @@ pub struct Plant {
 }
 
 impl Plant {
+    /// y(k) = 1.93 y(k−1) − 0.94 y(k−2) + what the inputs drive.
+    pub const MEMORY: [f64; 2] = [1.93, -0.94];
+
+    /// What a unit of input `j` drives in output `i` within a sample, at rest.
+    #[must_use]
+    pub fn gain(i: usize, j: usize) -> f64 {
+        if j == 1 {
+            1e-5
+        } else {
+            4e-4 * ((i + j) as f64).cos()
+        }
+    }
+
     /// At rest.
     #[must_use]
     pub fn new(inputs: usize, outputs: usize, seed: u64) -> Self {
@@ -50,16 +63,12 @@ impl Plant {
         for (i, measured) in output.iter_mut().enumerate() {
             let mut drive = 0.0;
             for (j, value) in input.iter().enumerate() {
-                let gain = if j == 1 {
-                    1e-5
-                } else {
-                    4e-4 * ((i + j) as f64).cos()
-                };
-                drive += gain * factor * (value - Self::rest(j));
+                drive += Self::gain(i, j) * factor * (value - Self::rest(j));
             }
             let noise = NOISE * self.normal();
             let [present, previous] = self.states[i];
-            let next = 1.93 * present - 0.94 * previous + drive;
+            let [recent, before] = Self::MEMORY;
+            let next = recent * present + before * previous + drive;
             self.states[i] = [next, present];
             *measured = next + noise;
         }

@@ -1,6 +1,6 @@
 //! Consecutive moments of a closed loop, recorded once and replayed to every back end.
 
-use deepc_core::program::{DeepcProgram, Moment, PlanOrigin};
+use deepc_core::program::{Moment, PlanOrigin, PredictiveProgram};
 use deepc_core::solver::{QpSolver, SolveBudget};
 use faer::Mat;
 
@@ -32,7 +32,7 @@ impl Replay {
     /// If a step cannot be solved: the problems are made to have solutions.
     pub fn record(
         case: &Case,
-        program: &mut dyn DeepcProgram,
+        program: &mut dyn PredictiveProgram,
         solver: &mut dyn QpSolver,
         steps: usize,
     ) -> Self {
@@ -79,6 +79,7 @@ impl Replay {
                 }
             }
             plant.step(&input, &mut output);
+            program.observe(&input, &[], &output);
             for (j, value) in input.iter().enumerate() {
                 replay.inputs[(k, j)] = *value;
             }
@@ -121,6 +122,39 @@ impl Replay {
             disturbances: None,
         }
     }
+}
+
+impl Replay {
+    /// Tells a program the newest sample of moment `k`, as a controller does before it decides.
+    ///
+    /// # Panics
+    /// If there is no such moment.
+    pub fn tell(&self, k: usize, program: &mut dyn PredictiveProgram, sample: &mut Sample) {
+        let row = k + self.past - 1;
+        for (entry, value) in sample.input.iter_mut().zip(self.inputs.row(row).iter()) {
+            *entry = *value;
+        }
+        for (entry, value) in sample.output.iter_mut().zip(self.outputs.row(row).iter()) {
+            *entry = *value;
+        }
+        program.observe(&sample.input, &[], &sample.output);
+    }
+
+    /// Room for a sample.
+    #[must_use]
+    pub fn room(&self) -> Sample {
+        Sample {
+            input: vec![0.0; self.inputs.ncols()],
+            output: vec![0.0; self.outputs.ncols()],
+        }
+    }
+}
+
+/// Room for one sample, so that telling it allocates nothing.
+#[derive(Debug, Clone)]
+pub struct Sample {
+    input: Vec<f64>,
+    output: Vec<f64>,
 }
 
 /// Bounds that push in the last solution; `equalities` rows come before those of the bounds.

@@ -3,7 +3,7 @@
 use benches::backend::{self, ACTIVE_SET};
 use benches::case::{Activity, Case};
 use benches::replay::Replay;
-use deepc_core::program::{CondensedProgram, DeepcProgram};
+use deepc_core::program::{CondensedProgram, PredictiveProgram};
 
 /// Bounds active at the moments of a closed loop.
 fn active(activity: Activity, output_weight: f64) -> Vec<usize> {

@@ -7,12 +7,14 @@ use deepc_core::faer::Mat;
 use deepc_core::hankel::{HankelMatrix, Horizons};
 use deepc_core::predictor::Predictor;
 use deepc_core::program::{Bounds, Moment, OutputPredictor, Regularisation, Slack};
-use deepc_core::program::{CondensedProgram, DeepcProgram, DeepcSettings, MeasuredDisturbances};
+use deepc_core::program::{
+    CondensedProgram, DeepcSettings, MeasuredDisturbances, PredictiveProgram,
+};
 use deepc_core::solver::{ActiveSet, ActiveSetSettings, SolveBudget};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let layout = CsvLayout {
-        time: "time_s".into(),
+        time: Some("time_s".into()),
         inputs: vec!["heater_kw".into(), "fan".into()],
         disturbances: vec!["outdoor_c".into()],
         outputs: vec!["room_c".into()],

@@ -6,7 +6,7 @@ use deepc_core::data::Dataset;
 use deepc_core::hankel::{HankelMatrix, Horizons};
 use deepc_core::predictor::Predictor;
 use deepc_core::program::{Bounds, OutputBounds, ProgramOptions, Regularisation, Slack};
-use deepc_core::program::{DeepcProgram, DeepcSettings, SparseProgram};
+use deepc_core::program::{DeepcSettings, PredictiveProgram, SparseProgram};
 use deepc_core::solver::{ClarabelSettings, ClarabelSolver, SolveBudget};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;

@@ -130,6 +130,7 @@
 pub use faer;
 
 pub mod assessment;
+mod columns;
 pub mod controller;
 pub mod data;
 pub mod hankel;

@@ -6,14 +6,14 @@ use deepc_core::data::{CsvLayout, DataError, Dataset, OutputTiming};
 use deepc_core::hankel::{HankelError, HankelMatrix, Horizons};
 use deepc_core::predictor::Predictor;
 use deepc_core::program::{
-    Bounds, CondensedProgram, DeepcProgram, DeepcSettings, Moment, OutputBounds, ProgramOptions,
-    Regularisation, Slack,
+    Bounds, CondensedProgram, DeepcSettings, Moment, OutputBounds, PredictiveProgram,
+    ProgramOptions, Regularisation, Slack,
 };
 use faer::{Mat, mat};
 
 fn layout() -> CsvLayout {
     CsvLayout {
-        time: "time_s".into(),
+        time: Some("time_s".into()),
         inputs: vec!["valve".into(), "heater".into()],
         disturbances: Vec::new(),
         outputs: vec!["level".into(), "temperature".into()],
@@ -28,7 +28,7 @@ fn read(text: &str) -> Result<Dataset, DataError> {
     data.push_csv(
         text.as_bytes(),
         "run.csv",
-        &layout.time,
+        layout.time.as_deref(),
         layout.outputs_measured,
     )?;
     Ok(data)
@@ -76,7 +76,7 @@ fn what_is_written_is_read_back_bit_by_bit() {
         data.write_csv(i + 1, file, "t").unwrap();
     }
     let layout = CsvLayout {
-        time: "t".into(),
+        time: Some("t".into()),
         inputs: vec!["valve".into(), "heater".into()],
         disturbances: Vec::new(),
         outputs: vec!["level".into()],
@@ -107,7 +107,7 @@ fn nan_is_reported_with_channel_sample_line_and_record() {
         data.push_csv(
             bad.as_bytes(),
             "second.csv",
-            "time_s",
+            Some("time_s"),
             OutputTiming::EndOfInterval,
         ),
         &[
@@ -443,37 +443,6 @@ fn a_moment_of_the_wrong_shape_is_refused_with_its_name() {
         program.set_moment(&moment),
         &["the past of the outputs is 2×4, expected 4×2"],
     );
-}
-
-#[test]
-fn inputs_are_paired_with_the_outputs_of_the_next_row_where_a_log_says_so() {
-    let text = "time_s,u,v,y,z\n0,1,10,100,1000\n1,2,20,200,2000\n2,3,30,300,3000\n";
-    let mut data = Dataset::new(1.0, ["u", "v"], ["y", "z"]).unwrap();
-    let start = OutputTiming::StartOfInterval;
-    data.push_csv(text.as_bytes(), "log.csv", "time_s", start)
-        .unwrap();
-    let record = &data.records()[0];
-    assert_eq!(record.inputs(), faer::mat![[1.0, 10.0], [2.0, 20.0]]);
-    assert_eq!(
-        record.outputs(),
-        faer::mat![[200.0, 2000.0], [300.0, 3000.0]]
-    );
-
-    let broken = text.replace("2000", "NaN");
-    let message = data
-        .push_csv(broken.as_bytes(), "log.csv", "time_s", start)
-        .unwrap_err();
-    let message = message.to_string();
-    assert!(
-        message.contains("`z` is NaN at sample 0 (line 3)"),
-        "{message}"
-    );
-
-    let one_row = "time_s,u,v,y,z\n0,1,10,100,1000\n";
-    let message = data
-        .push_csv(one_row.as_bytes(), "log.csv", "time_s", start)
-        .unwrap_err();
-    assert!(message.to_string().contains("no samples"), "{message}");
 }
 
 #[test]

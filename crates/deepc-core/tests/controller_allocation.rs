@@ -9,7 +9,7 @@ mod plants;
 use allocation_counter::measure;
 use deepc_core::controller::{Controller, DeepcController, RecedingHorizonSettings, Reference};
 use deepc_core::program::{
-    AffineConstraint, Bounds, CondensedProgram, DeepcProgram, ProgramOptions, Softness, Steps,
+    AffineConstraint, Bounds, CondensedProgram, PredictiveProgram, ProgramOptions, Softness, Steps,
 };
 use deepc_core::solver::{
     ActiveSet, ActiveSetSettings, Admm, AdmmSettings, SoftPenalty, SolveBudget,

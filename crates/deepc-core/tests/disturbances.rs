@@ -42,7 +42,7 @@ fn files_keep_disturbances_and_their_timing() {
     let data = recorded(&Lti::random(2, 3, 2, 0.9, 1), 2, &[30], 5);
     data.write_csv(1, &file, "t").unwrap();
     let mut layout = CsvLayout {
-        time: "t".into(),
+        time: Some("t".into()),
         inputs: common::names("u", 2),
         disturbances: common::names("d", 1),
         outputs: common::names("y", 2),

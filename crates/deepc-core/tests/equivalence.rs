@@ -9,8 +9,8 @@ use deepc_core::data::Dataset;
 use deepc_core::hankel::{HankelMatrix, Horizons};
 use deepc_core::predictor::Predictor;
 use deepc_core::program::{
-    Bounds, CondensedProgram, DeepcProgram, DeepcSettings, Moment, Normalisation, OutputBounds,
-    ProgramOptions, Regularisation, Slack, SparseProgram,
+    Bounds, CondensedProgram, DeepcSettings, Moment, Normalisation, OutputBounds,
+    PredictiveProgram, ProgramOptions, Regularisation, Slack, SparseProgram,
 };
 use deepc_core::solver::{
     ActiveSet, ActiveSetSettings, ClarabelSettings, ClarabelSolver, QpStatus, SolveBudget,
@@ -181,7 +181,7 @@ fn the_parts_of_the_objective_agree_between_the_forms_and_add_up() {
     let mut condensed = CondensedProgram::new(&predictor, &settings).unwrap();
     let mut sparse = SparseProgram::new(&predictor, &settings).unwrap();
     let mut recovered = Vec::new();
-    let programs: [&mut dyn DeepcProgram; 2] = [&mut condensed, &mut sparse];
+    let programs: [&mut dyn PredictiveProgram; 2] = [&mut condensed, &mut sparse];
     for program in programs {
         assert!(program.recover().is_none());
         let mut solver = ClarabelSolver::new(program.qp(), ClarabelSettings::default()).unwrap();

@@ -447,7 +447,7 @@ fn the_one_norm_is_its_epigraph() {
                 gap < 1e-6,
                 "{input_slack:?}, {output_slack:?}, {seed}: {gap:e}"
             );
-            let recovered = deepc_core::program::DeepcProgram::recover(&program).unwrap();
+            let recovered = deepc_core::program::PredictiveProgram::recover(&program).unwrap();
             let norm: f64 = g.iter().map(|g| g.abs()).sum();
             let charge = settings.regularisation.lambda_g * norm;
             assert!((recovered.parts.regularisation - charge).abs() < 1e-7 * charge);

@@ -4,8 +4,8 @@ mod common;
 mod formulations_support;
 
 use deepc_core::program::{
-    AffineConstraint, Bounds, CondensedProgram, DeepcProgram, DeepcSettings, DisturbanceSlack,
-    OutputBounds, PlanOrigin, ProgramError, Recovered, Regularisation, Slack, Softness,
+    AffineConstraint, Bounds, CondensedProgram, DeepcSettings, DisturbanceSlack, OutputBounds,
+    PlanOrigin, PredictiveProgram, ProgramError, Recovered, Regularisation, Slack, Softness,
     SparseProgram, Steps, Terminal,
 };
 use deepc_core::solver::SoftPenalty;
@@ -30,9 +30,15 @@ fn close(what: &str, a: f64, b: f64, scale: f64) {
 }
 
 /// The recovered variables are a point of the full problem, with the cost the program states.
-fn check_recovered(what: &str, program: &dyn DeepcProgram, situation: &Situation, study: &Study) {
+fn check_recovered(
+    what: &str,
+    program: &dyn PredictiveProgram,
+    settings: &DeepcSettings,
+    situation: &Situation,
+    study: &Study,
+) {
     let recovered: Recovered = program.recover().unwrap();
-    let (settings, sizes) = (program.settings(), study.sizes);
+    let sizes = study.sizes;
     let objective = program.objective().unwrap();
     let parts = recovered.parts;
     close(what, parts.total(), objective, objective);
@@ -101,16 +107,16 @@ fn parts_add_up_and_g_gives_the_trajectory() {
                 );
                 let mut condensed = CondensedProgram::new(&study.predictor, &settings).unwrap();
                 solve(&mut condensed, &situation, fast);
-                check_recovered(&what, &condensed, &situation, &study);
+                check_recovered(&what, &condensed, &settings, &situation, &study);
                 // Nothing is bounded: the same from the gain alone.
                 let free = unbounded(settings.clone());
                 let mut condensed = CondensedProgram::new(&study.predictor, &free).unwrap();
                 let plan = solve(&mut condensed, &situation, fast);
                 assert_eq!(plan.origin, PlanOrigin::Unconstrained);
-                check_recovered(&what, &condensed, &situation, &study);
+                check_recovered(&what, &condensed, &settings, &situation, &study);
                 if let Ok(mut sparse) = SparseProgram::new(&study.predictor, &settings) {
                     solve(&mut sparse, &situation, accurate);
-                    check_recovered(&what, &sparse, &situation, &study);
+                    check_recovered(&what, &sparse, &settings, &situation, &study);
                 }
             }
         }

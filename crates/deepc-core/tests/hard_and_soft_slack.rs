@@ -5,7 +5,7 @@ mod common;
 use common::Lti;
 use deepc_core::predictor::Predictor;
 use deepc_core::program::{
-    Bounds, CondensedProgram, DeepcProgram, DeepcSettings, Moment, OutputBounds, Plan,
+    Bounds, CondensedProgram, DeepcSettings, Moment, OutputBounds, Plan, PredictiveProgram,
     ProgramError, ProgramOptions, Regularisation, Slack,
 };
 use deepc_core::solver::{ActiveSet, ActiveSetSettings, QpStatus, SolveBudget};

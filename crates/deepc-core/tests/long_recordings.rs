@@ -9,8 +9,8 @@ use deepc_core::hankel::{
 };
 use deepc_core::predictor::{Predictor, ReductionMethod};
 use deepc_core::program::{
-    Bounds, CondensedProgram, DeepcProgram, DeepcSettings, MeasuredDisturbances, Moment,
-    OutputBounds, ProgramOptions, Regularisation, Slack,
+    Bounds, CondensedProgram, DeepcSettings, MeasuredDisturbances, Moment, OutputBounds,
+    PredictiveProgram, ProgramOptions, Regularisation, Slack,
 };
 use faer::{Mat, MatRef};
 use proptest::prelude::*;

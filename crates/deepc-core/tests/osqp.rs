@@ -6,7 +6,7 @@ mod common;
 use common::Lti;
 use deepc_core::predictor::Predictor;
 use deepc_core::program::{
-    Bounds, CondensedProgram, DeepcProgram, DeepcSettings, Moment, OutputBounds, PlanOrigin,
+    Bounds, CondensedProgram, DeepcSettings, Moment, OutputBounds, PlanOrigin, PredictiveProgram,
     ProgramOptions, Regularisation, Slack, SparseProgram,
 };
 use deepc_core::solver::{
@@ -43,7 +43,7 @@ fn settings(slack: Slack) -> DeepcSettings {
 }
 
 /// Consecutive moments of a recording that the predictor has not seen.
-fn check_steps(program: &mut dyn DeepcProgram, osqp: &mut dyn QpSolver) {
+fn check_steps(program: &mut dyn PredictiveProgram, osqp: &mut dyn QpSolver) {
     let mut reference = Reference::new(program.qp(), ClarabelSettings::default()).unwrap();
     let (inputs, outputs) = common::record(&Lti::random(4, 2, 3, 0.85, 42), 80, 0.05, 9);
     let budget = SolveBudget::generous();

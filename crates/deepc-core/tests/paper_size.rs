@@ -5,7 +5,7 @@ mod common;
 
 use deepc_core::predictor::Predictor;
 use deepc_core::program::{
-    Bounds, CondensedProgram, DeepcProgram, DeepcSettings, Moment, OutputBounds, PlanOrigin,
+    Bounds, CondensedProgram, DeepcSettings, Moment, OutputBounds, PlanOrigin, PredictiveProgram,
     ProgramOptions, Regularisation, Slack,
 };
 use deepc_core::solver::{

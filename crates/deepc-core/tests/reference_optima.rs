@@ -10,8 +10,8 @@ use deepc_core::data::Dataset;
 use deepc_core::hankel::{HankelMatrix, Horizons};
 use deepc_core::predictor::Predictor;
 use deepc_core::program::{
-    Bounds, CondensedProgram, DeepcProgram, DeepcSettings, Moment, OutputBounds, ProgramOptions,
-    Regularisation, Slack, SparseProgram,
+    Bounds, CondensedProgram, DeepcSettings, Moment, OutputBounds, PredictiveProgram,
+    ProgramOptions, Regularisation, Slack, SparseProgram,
 };
 use deepc_core::solver::{
     ActiveSet, ActiveSetSettings, ClarabelSettings, ClarabelSolver, QpSolver, SolveBudget,
@@ -108,7 +108,7 @@ impl Case {
         }
     }
 
-    fn solve(&self, program: &mut dyn DeepcProgram, solver: &mut dyn QpSolver) -> Solved {
+    fn solve(&self, program: &mut dyn PredictiveProgram, solver: &mut dyn QpSolver) -> Solved {
         let input_reference = Mat::zeros(self.expected.future, self.expected.m);
         let moment = Moment {
             past_inputs: self.past_inputs.as_ref(),

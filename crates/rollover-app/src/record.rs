@@ -121,7 +121,7 @@ pub fn write(path: &Path, dataset: &Dataset) -> Result<()> {
 /// When the file is missing, malformed, or lacks a column; the message names the place.
 pub fn read(path: &Path, scenario: &Scenario) -> Result<Dataset> {
     let layout = CsvLayout {
-        time: TIME_COLUMN.to_owned(),
+        time: Some(TIME_COLUMN.to_owned()),
         inputs: INPUT_COLUMNS.map(str::to_owned).to_vec(),
         disturbances: Vec::new(),
         outputs: OUTPUT_COLUMNS.map(str::to_owned).to_vec(),

@@ -10,7 +10,7 @@ use benches::case::Case;
 use benches::replay::{Replay, active_bounds};
 use deepc_core::data::Dataset;
 use deepc_core::predictor::Predictor;
-use deepc_core::program::{DeepcProgram, SparseProgram};
+use deepc_core::program::{PredictiveProgram, SparseProgram};
 use deepc_core::solver::{QpSolver, SolveBudget};
 
 use crate::condensed::{mean, median_time};

@@ -7,11 +7,12 @@ use benches::backend::{self, ACTIVE_SET};
 use benches::case::Case;
 use benches::replay::{Replay, active_bounds};
 use deepc_core::data::Dataset;
-use deepc_core::program::{CondensedProgram, DeepcProgram, PlanOrigin};
+use deepc_core::program::{CondensedProgram, PlanOrigin, PredictiveProgram};
 use deepc_core::solver::{QpSolver, SolveBudget};
 
 use crate::as_written::{self, Reference};
 use crate::bandwidth::BareProduct;
+use crate::lmpc;
 use crate::rows::{CONDENSED, PRODUCT, Row, Times};
 use crate::run::Run;
 
@@ -24,7 +25,7 @@ const BLOCK: usize = 100;
 const REFERENCE_MOMENTS: usize = 100;
 
 /// Accuracy asked of the condensed solvers.
-const TOLERANCE: f64 = 1e-9;
+pub const TOLERANCE: f64 = 1e-9;
 
 /// What one case gave.
 pub struct CaseResult {
@@ -150,6 +151,9 @@ pub fn measure(run: &Run, case: &Case, with_written: bool) -> Result<CaseResult>
         .map(|track| track.row(case, &references))
         .collect();
     let mut steps: Vec<usize> = tracks.iter().map(|track| track.times.len()).collect();
+    let (row, count) = lmpc::measure(run, case, &replay)?;
+    rows.push(row);
+    steps.push(count);
     rows.push(product_row(case, &product, &product_times));
     steps.push(product_times.len());
     if with_written {

@@ -5,14 +5,14 @@ use anyhow::Result;
 use crate::chart::{self, Bar, Line};
 use crate::condensed::CaseResult;
 use crate::page::{duration, formulation_words};
-use crate::rows::{CONDENSED, FULL, PRODUCT, REDUCED, Row};
+use crate::rows::{CONDENSED, FULL, LMPC, PRODUCT, REDUCED, Row};
 use crate::sweeps::{FUTURE, INPUTS, OUTPUTS, PAST, Point, SAMPLES, Sweeps};
 
 /// Median step of every formulation and back end of one case, the slowest on top.
 pub fn steps(case: &CaseResult) -> Result<String> {
     let mut rows: Vec<&Row> = case.rows.iter().collect();
     rows.sort_by(|a, b| b.median_us.total_cmp(&a.median_us));
-    let groups = [FULL, REDUCED, CONDENSED, PRODUCT];
+    let groups = [FULL, REDUCED, CONDENSED, PRODUCT, LMPC];
     let bars: Vec<Bar> = rows
         .iter()
         .map(|row| Bar {

@@ -6,8 +6,9 @@ mod bandwidth;
 mod chart;
 mod condensed;
 mod figures;
+mod lmpc;
 mod machine;
-mod output;
+
 mod page;
 mod rows;
 mod run;
@@ -17,6 +18,7 @@ mod with_osqp;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
+use benches::output;
 use clap::Parser;
 
 use run::{Extent, Run};

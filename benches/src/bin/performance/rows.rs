@@ -69,4 +69,5 @@ pub struct Row {
 pub const FULL: &str = "full";
 pub const REDUCED: &str = "rd";
 pub const CONDENSED: &str = "condensed";
+pub const LMPC: &str = "lmpc, condensed";
 pub const PRODUCT: &str = "matrix-vector product";

@@ -147,9 +147,8 @@ fn cases() -> [(Case, bool); 4] {
     ]
 }
 
-/// Measures the comparison. The model-based controller (the LMPC of the crate `sysid`) joins
-/// here once it exists: as one more formulation in `condensed::measure`, replaying the same
-/// moments with its own state estimate in place of the past window.
+/// Measures the comparison, with the linear MPC of the crate `sysid` as one more formulation that
+/// replays the same moments.
 pub fn comparison(run: &Run) -> Result<Comparison> {
     let mut results = Vec::new();
     for (case, as_written) in cases() {

@@ -7,7 +7,7 @@ use anyhow::{Result, ensure};
 use benches::backend::{self, ACTIVE_SET};
 use benches::case::{Activity, Case};
 use benches::replay::{Replay, active_bounds};
-use deepc_core::program::{CondensedProgram, DeepcProgram, PlanOrigin};
+use deepc_core::program::{CondensedProgram, PlanOrigin, PredictiveProgram};
 use deepc_core::solver::SolveBudget;
 use serde::Serialize;
 

@@ -16,10 +16,10 @@
 
 mod closed_loop;
 pub mod contract;
-mod deepc;
 mod error;
 mod fallback;
 mod planner;
+mod receding_horizon;
 mod reference;
 mod samples;
 mod scheduled;
@@ -30,10 +30,10 @@ mod time_histogram;
 mod window;
 
 pub use closed_loop::{ClosedLoopRun, run_closed_loop};
-pub use deepc::DeepcController;
 pub use error::{ControllerError, PlantError};
 pub use fallback::FallbackContext;
 pub use planner::Planner;
+pub use receding_horizon::{DeepcController, RecedingHorizonController};
 pub use reference::Reference;
 pub use scheduled::{ScheduleContext, ScheduleSettings, ScheduledController};
 pub use settings::{FallbackPolicy, RecedingHorizonSettings};

@@ -1,15 +1,18 @@
 //! A program with its solvers: moment in, plan out.
 
 use super::error::ControllerError;
+use super::samples::Sample;
 use super::step::{Origin, Step};
 use crate::data::same_sample_time;
 use crate::predictor::Predictor;
-use crate::program::{CondensedProgram, DeepcProgram, DeepcSettings, Moment, Plan, ProgramError};
+use crate::program::{
+    CondensedProgram, DeepcSettings, Moment, Plan, PredictiveProgram, ProgramError,
+};
 use crate::solver::{ActiveSet, ActiveSetSettings, QpSolver, QpStatus, SolveBudget};
 
-/// A program and the solvers set up with its [`DeepcProgram::qp`].
+/// A program and the solvers set up with its [`PredictiveProgram::qp`].
 pub struct Planner {
-    program: Box<dyn DeepcProgram>,
+    program: Box<dyn PredictiveProgram>,
     solver: Box<dyn QpSolver>,
     second: Option<Box<dyn QpSolver>>,
 }
@@ -35,7 +38,7 @@ impl Planner {
     /// # Errors
     /// The solver was set up for another program.
     pub fn new(
-        program: Box<dyn DeepcProgram>,
+        program: Box<dyn PredictiveProgram>,
         solver: Box<dyn QpSolver>,
     ) -> Result<Self, ControllerError> {
         check_solver(program.as_ref(), solver.as_ref())?;
@@ -70,7 +73,7 @@ impl Planner {
 
     /// The program.
     #[must_use]
-    pub fn program(&self) -> &dyn DeepcProgram {
+    pub fn program(&self) -> &dyn PredictiveProgram {
         self.program.as_ref()
     }
 
@@ -103,8 +106,20 @@ impl Planner {
         is_usable(program.plan()).then_some(Origin::SecondSolver)
     }
 
-    /// Drops what the solvers would start from.
+    /// Passes a sample of the window on to the program.
+    pub(super) fn observe(&mut self, sample: Sample<'_>) {
+        self.program
+            .observe(sample.input, sample.disturbance, sample.output);
+    }
+
+    /// The past window is all that is known.
+    pub(super) fn forget_samples(&mut self) {
+        self.program.forget();
+    }
+
+    /// Drops what the solvers would start from, and the samples.
     pub(super) fn forget(&mut self) {
+        self.forget_samples();
         self.solver.forget();
         if let Some(second) = &mut self.second {
             second.forget();
@@ -129,7 +144,7 @@ impl Planner {
 }
 
 fn ask(
-    program: &mut dyn DeepcProgram,
+    program: &mut dyn PredictiveProgram,
     solver: &mut dyn QpSolver,
     budget: &SolveBudget,
     step: &mut Step,
@@ -156,7 +171,10 @@ fn is_usable(plan: &Plan) -> bool {
         && plan.outputs.is_all_finite()
 }
 
-fn check_solver(program: &dyn DeepcProgram, solver: &dyn QpSolver) -> Result<(), ControllerError> {
+fn check_solver(
+    program: &dyn PredictiveProgram,
+    solver: &dyn QpSolver,
+) -> Result<(), ControllerError> {
     let (ours, theirs) = (program.qp(), solver.problem());
     let sizes = (ours.variable_count(), ours.row_count());
     if sizes != (theirs.variable_count(), theirs.row_count()) {

@@ -4,7 +4,7 @@ use super::step::{Fault, StoredPlan};
 use super::window::Window;
 use crate::hankel::Shape;
 
-/// One sample as it was reported. Slices may have any length and hold anything.
+/// One sample. As it was reported, slices may have any length and hold anything.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sample<'a> {
     pub input: &'a [f64],
@@ -155,6 +155,15 @@ impl Samples {
     /// y(k−1), measured or repaired; `None` before the window holds a sample.
     pub fn output(&self) -> Option<&[f64]> {
         (self.window.outputs().nrows() > 0).then_some(&self.output)
+    }
+
+    /// The sample taken last, as it stands in the window; `None` if the window is empty.
+    pub fn newest(&self) -> Option<Sample<'_>> {
+        Some(Sample {
+            input: &self.input,
+            disturbance: &self.disturbance,
+            output: self.output()?,
+        })
     }
 
     /// Outputs that have not changed for too long.

@@ -5,10 +5,10 @@ use std::time::Instant;
 use serde::{Deserialize, Serialize};
 
 use super::Controller;
-use super::deepc::DeepcController;
 use super::error::ControllerError;
 use super::fallback::FallbackContext;
 use super::planner::Planner;
+use super::receding_horizon::RecedingHorizonController;
 use super::reference::Reference;
 use super::settings::RecedingHorizonSettings;
 use super::statistics::StepStatistics;
@@ -67,7 +67,7 @@ pub struct ScheduleContext<'a> {
 
 type Signal = Box<dyn FnMut(&ScheduleContext<'_>) -> f64 + Send>;
 
-/// A [`DeepcController`] over several data sets, for a plant that one linear predictor cannot
+/// A [`RecedingHorizonController`] over several data sets, for a plant that one linear predictor cannot
 /// hold: each program is built from data around one operating point, and the one for the present
 /// point plans. The past window and the last plan are shared, so nothing starts anew at a switch.
 /// [`Step::data_set`] says which one acted.
@@ -110,7 +110,7 @@ type Signal = Box<dyn FnMut(&ScheduleContext<'_>) -> f64 + Send>;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct ScheduledController {
-    inner: DeepcController,
+    inner: RecedingHorizonController,
     settings: ScheduleSettings,
     signal: Signal,
     external: Option<f64>,
@@ -137,7 +137,7 @@ impl ScheduledController {
             data_sets: 0,
             ranges: schedule.ranges.ranges(),
         })?;
-        let mut inner = DeepcController::with_planner(first, horizon)?;
+        let mut inner = RecedingHorizonController::with_planner(first, horizon)?;
         for planner in planners {
             inner.add_planner(planner)?;
         }
@@ -180,7 +180,7 @@ impl ScheduledController {
         )
     }
 
-    /// As [`DeepcController::with_user_fallback`].
+    /// As [`RecedingHorizonController::with_user_fallback`].
     #[must_use]
     pub fn with_user_fallback(
         mut self,

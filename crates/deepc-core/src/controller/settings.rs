@@ -78,12 +78,12 @@ impl RecedingHorizonSettings {
 /// What acts when a solve fails or is late, or a measurement or reference is bad. In this order:
 ///
 /// 1. the second solver, if there is one
-///    ([`with_second_solver`](super::DeepcController::with_second_solver)) and the first one
+///    ([`with_second_solver`](super::RecedingHorizonController::with_second_solver)) and the first one
 ///    failed;
 /// 2. the last plan, shifted: its move for this sample;
 /// 3. the input applied last, held;
 /// 4. the user's own choice
-///    ([`with_user_fallback`](super::DeepcController::with_user_fallback)); without one the input
+///    ([`with_user_fallback`](super::RecedingHorizonController::with_user_fallback)); without one the input
 ///    is held on.
 ///
 /// A plan that was left for one of the later two, or because another input than its own was

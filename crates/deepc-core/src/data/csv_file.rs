@@ -34,12 +34,15 @@ pub enum OutputTiming {
 /// the outputs.
 ///
 /// The file has one header line; it may have further columns, and its columns may stand in
-/// any order. Time stamps are in seconds and must lie on `t_0` + k·Ts to within 1 % of Ts.
+/// any order. Time stamps, if there are any, are in seconds and must lie on `t_0` +
+/// k·Ts to within 1 % of Ts.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CsvLayout {
-    /// Name of the time column (seconds).
-    pub time: String,
+    /// Name of the time column (seconds). `None` (left out of a file): there is none, and the rows are
+    /// Ts apart because you say so.
+    #[serde(default)]
+    pub time: Option<String>,
     /// Names of the input columns; they become the input channels, in this order.
     pub inputs: Vec<String>,
     /// Names of the columns of measured disturbances, in this order; none if left out.
@@ -76,7 +79,7 @@ impl Dataset {
             data.push_csv(
                 BufReader::new(file),
                 &name,
-                &layout.time,
+                layout.time.as_deref(),
                 layout.outputs_measured,
             )?;
         }
@@ -84,7 +87,7 @@ impl Dataset {
     }
 
     /// Reads one record from `reader`; `name` stands for it in messages. The columns are found
-    /// by this data set's channel names.
+    /// by this data set's channel names. Without a `time_column` the rows are taken to be Ts apart.
     ///
     /// # Errors
     /// As [`Dataset::read_csv`].
@@ -92,7 +95,7 @@ impl Dataset {
         &mut self,
         reader: R,
         name: &str,
-        time_column: &str,
+        time_column: Option<&str>,
         outputs_measured: OutputTiming,
     ) -> Result<(), DataError> {
         let mut reader = csv::ReaderBuilder::new()
@@ -107,7 +110,10 @@ impl Dataset {
             return Err(DataError::EmptyFile { file: name.into() });
         }
         let column = |wanted: &str| find_column(&header, wanted, name);
-        let time = column(time_column)?;
+        let time = match time_column {
+            Some(name) => Some((name, column(name)?)),
+            None => None,
+        };
         let columns = |names: &[String]| -> Result<Vec<_>, _> {
             names.iter().map(|name| column(name)).collect()
         };
@@ -129,7 +135,9 @@ impl Dataset {
                     text: text.into(),
                 })
             };
-            clock.check(number(time)?, line, name, time_column)?;
+            if let Some((column, index)) = time {
+                clock.check(number(index)?, line, name, column)?;
+            }
             for signals in [&mut inputs, &mut disturbances, &mut outputs] {
                 for &index in &signals.columns {
                     signals.values.push(number(index)?);

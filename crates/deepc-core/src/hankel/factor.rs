@@ -133,7 +133,13 @@ impl HankelFactor {
         let shape = check(dataset, horizons)?;
         let records: Vec<_> = dataset.records().iter().map(Record::channels).collect();
         let positions = shape.positions();
-        let (lower, report) = factor(&records, horizons.window(), &positions, method);
+        let (lower, report) = factor(
+            &records,
+            horizons.window(),
+            &positions,
+            OnesRow::Without,
+            method,
+        );
         Ok(Self {
             dataset: dataset.clone(),
             shape,
@@ -234,7 +240,13 @@ impl HankelData for HankelFactor {
             return (Mat::zeros(rows, 0), 0);
         }
         let positions: Vec<_> = (0..rows).collect();
-        let (mut lower, report) = factor(&records, depth, &positions, FactorMethod::Gram);
+        let (mut lower, report) = factor(
+            &records,
+            depth,
+            &positions,
+            OnesRow::Without,
+            FactorMethod::Gram,
+        );
         for j in 0..lower.ncols() {
             for (i, value) in lower.col_as_slice_mut(j).iter_mut().enumerate() {
                 *value /= scales[i % channels.len()];
@@ -244,15 +256,29 @@ impl HankelData for HankelFactor {
     }
 }
 
+/// Whether a row of ones stands on top of a Hankel matrix.
+///
+/// Behind it, the triangle is that of H with the mean of every row taken out: constants of any
+/// size in the channels change nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OnesRow {
+    /// H as it is.
+    Without,
+    /// `col(1, H)`, one row more.
+    OnTop,
+}
+
 /// Factor of the block Hankel matrix of the channels; time-major row r of it stands at
-/// `positions[r]`. Every record has at least `depth` samples.
-fn factor(
+/// `positions[r]`, below the ones. Every record has at least `depth` samples.
+pub(super) fn factor(
     records: &[Channels<'_>],
     depth: usize,
     positions: &[usize],
+    ones: OnesRow,
     method: FactorMethod,
 ) -> (Mat<f64>, FactorReport) {
-    let rows = positions.len();
+    let rows = positions.len() + usize::from(ones == OnesRow::OnTop);
     let columns = records.iter().map(|r| starts(r, depth)).sum();
     let mut report = FactorReport {
         method,
@@ -263,7 +289,7 @@ fn factor(
     };
     if method == FactorMethod::Gram {
         if columns > rows {
-            let (condition, lower) = by_gram(records, depth, positions);
+            let (condition, lower) = by_gram(records, depth, positions, ones);
             report.gram_condition = condition;
             if let Some(lower) = lower {
                 return (lower, report);
@@ -272,11 +298,11 @@ fn factor(
         }
         report.method = FactorMethod::BlockQr;
     }
-    let lower = by_blocks(records, depth, positions);
+    let lower = by_blocks(records, depth, positions, ones);
     (lower.subcols(0, rows.min(columns)).to_owned(), report)
 }
 
-fn starts(record: &Channels<'_>, depth: usize) -> usize {
+pub(super) fn starts(record: &Channels<'_>, depth: usize) -> usize {
     windows(record.first().map_or(0, |series| series.len()), depth)
 }
 
@@ -286,6 +312,7 @@ fn by_gram(
     records: &[Channels<'_>],
     depth: usize,
     positions: &[usize],
+    ones: OnesRow,
 ) -> (Option<f64>, Option<Mat<f64>>) {
     let spreads = spreads(records);
     let mut row_spreads = vec![spreads[0]; positions.len()];
@@ -306,6 +333,20 @@ fn by_gram(
     }
     // R̃·[μᵀ; diag(σ)] is a triangle below one full row: the triangle, updated by that row.
     let n = positions.len();
+    let first = (row_spreads.iter().enumerate()).map(|(i, spread)| {
+        spread.mean * augmented[(0, 0)] + spread.deviation * augmented[(1 + i, 0)]
+    });
+    if ones == OnesRow::OnTop {
+        let mut lower = Mat::zeros(1 + n, 1 + n);
+        lower[(0, 0)] = augmented[(0, 0)];
+        for (i, first) in first.enumerate() {
+            lower[(1 + i, 0)] = first;
+            for j in 0..=i {
+                lower[(1 + i, 1 + j)] = row_spreads[i].deviation * augmented[(1 + i, 1 + j)];
+            }
+        }
+        return (Some(condition), Some(lower));
+    }
     let mut triangle = Triangle::of(Mat::from_fn(n, n, |i, j| {
         if i < j {
             0.0
@@ -313,18 +354,13 @@ fn by_gram(
             row_spreads[i].deviation * augmented[(1 + i, 1 + j)]
         }
     }));
-    let mut first: Vec<_> = (row_spreads.iter().enumerate())
-        .map(|(i, spread)| {
-            spread.mean * augmented[(0, 0)] + spread.deviation * augmented[(1 + i, 0)]
-        })
-        .collect();
-    triangle.update(&mut first);
+    triangle.update(&mut first.collect::<Vec<_>>());
     (Some(condition), Some(triangle.into_lower()))
 }
 
 /// Estimates the condition number of L·Lᵀ by power iterations on it and its inverse: from below,
 /// and seldom by more than a tenth.
-fn gram_condition(lower: MatRef<'_, f64>) -> f64 {
+pub(super) fn gram_condition(lower: MatRef<'_, f64>) -> f64 {
     const ITERATIONS: usize = 15;
     let n = lower.nrows();
     let growth = |apply: &dyn Fn(&mut Vec<f64>)| -> f64 {
@@ -354,12 +390,20 @@ fn gram_condition(lower: MatRef<'_, f64>) -> f64 {
     largest * inverse
 }
 
-fn by_blocks(records: &[Channels<'_>], depth: usize, positions: &[usize]) -> Mat<f64> {
-    let mut triangle = Triangle::new(positions.len());
-    let mut qr = BlockQr::new(positions.len());
+fn by_blocks(
+    records: &[Channels<'_>],
+    depth: usize,
+    positions: &[usize],
+    ones: OnesRow,
+) -> Mat<f64> {
+    let offset = usize::from(ones == OnesRow::OnTop);
+    let mut triangle = Triangle::new(offset + positions.len());
+    let mut qr = BlockQr::new(offset + positions.len());
     for record in records {
         for start in 0..starts(record, depth) {
             qr.push(&mut triangle, |column| {
+                column[..offset].fill(1.0);
+                let column = &mut column[offset..];
                 for (channel, series) in record.iter().enumerate() {
                     for (time, &value) in series[start..start + depth].iter().enumerate() {
                         column[positions[stacked_position(time, channel, record.len())]] = value;

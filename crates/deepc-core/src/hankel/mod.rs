@@ -10,18 +10,20 @@ mod selection;
 mod shape;
 mod stacking;
 mod triangle;
+mod windows;
 
 use faer::{Mat, MatRef};
 use serde::{Deserialize, Serialize};
 
 pub use error::HankelError;
 pub use excitation::{ChannelExcitation, ExcitationReport, ExcitingRole, SingularValueGap};
-pub use factor::{FactorMethod, FactorReport, GRAM_CONDITION_LIMIT, HankelFactor};
+pub use factor::{FactorMethod, FactorReport, GRAM_CONDITION_LIMIT, HankelFactor, OnesRow};
 pub use proof::{HankelData, PersistentlyExciting};
 pub use rank::RANK_TOLERANCE;
 pub use selection::{PastWindow, Selection};
 pub use shape::{Block, Blocks, Horizons, Shape};
 pub use stacking::{block_hankel, stack, stack_into, stacked_position, unstack_into};
+pub use windows::{factor_windows, leading_condition};
 
 use crate::data::{Dataset, Record};
 pub(crate) use rank::ChannelScales;

@@ -7,6 +7,7 @@ use super::plan::{MeasuredDisturbances, Moment, ObjectiveParts, Plan, PlanOrigin
 use super::rows::ConstraintRows;
 use super::settings::DeepcSettings;
 use super::stage_cost::{StageCost, TrackingCost};
+use super::stage_settings::StageSettings;
 use crate::hankel::{Block, Shape, stack_into, unstack_into};
 use crate::predictor::Predictor;
 use crate::solver::{QpSolution, QpStatus};
@@ -14,9 +15,9 @@ use crate::solver::{QpSolution, QpStatus};
 #[derive(Debug)]
 pub(super) struct Common {
     pub shape: Shape,
-    pub settings: DeepcSettings,
+    pub stage: StageSettings,
     pub sample_time_s: f64,
-    /// J before any reduction.
+    /// J before any reduction; 0 without data.
     pub columns: usize,
     /// 1/λ of the slack of every entry of the known part; 0 where it is hard.
     pub compliance: Vec<f64>,
@@ -30,6 +31,7 @@ pub(super) struct Common {
 }
 
 impl Common {
+    /// For the data of a predictor.
     pub fn new(predictor: &Predictor, settings: &DeepcSettings) -> Result<Self, ProgramError> {
         let shape = predictor.shape();
         let horizons = shape.horizons;
@@ -54,17 +56,37 @@ impl Common {
         }
         let future_scales = &predictor.row_scales()[shape.known_rows()..];
         Ok(Self {
-            shape,
-            sample_time_s: predictor.sample_time_s(),
             columns: predictor.reduction().columns_before,
             compliance,
-            cost: StageCost::new(shape, settings),
-            rows: ConstraintRows::new(shape, settings, future_scales),
+            ..Self::without_data(
+                shape,
+                predictor.sample_time_s(),
+                future_scales,
+                settings.stage(),
+            )
+        })
+    }
+
+    /// For a future that is not predicted from data; `stage` was checked. `future_scales`: size of
+    /// every entry of f.
+    pub fn without_data(
+        shape: Shape,
+        sample_time_s: f64,
+        future_scales: &[f64],
+        stage: StageSettings,
+    ) -> Self {
+        Self {
+            shape,
+            sample_time_s,
+            columns: 0,
+            compliance: vec![0.0; shape.known_rows()],
+            cost: StageCost::new(shape, &stage),
+            rows: ConstraintRows::new(shape, &stage, future_scales),
             known: vec![0.0; shape.known_rows()],
             reference: vec![0.0; shape.future_rows()],
             plan: Plan::empty(shape),
-            settings: settings.clone(),
-        })
+            stage,
+        }
     }
 
     /// Stacks the moment into the known part and the reference, and moves the constraints.

@@ -6,10 +6,12 @@ use super::common::{Common, Ending};
 use super::error::ProgramError;
 use super::future_map::Elimination;
 use super::gain::Gain;
-use super::plan::{Moment, Plan, Recovered};
+use super::model::PredictionModel;
+use super::plan::{MeasuredDisturbances, Moment, Plan, Recovered};
 use super::recover::{least_norm, recovered};
 use super::settings::DeepcSettings;
-use super::{CONSISTENCY_TOLERANCE, DeepcProgram};
+use super::stage_settings::StageSettings;
+use super::{CONSISTENCY_TOLERANCE, PredictiveProgram};
 use crate::hankel::Shape;
 use crate::linalg;
 use crate::predictor::Predictor;
@@ -76,7 +78,34 @@ impl CondensedProgram {
             common.columns,
             &common.compliance,
         )?;
-        let gain = Gain::new(&common, &elimination, predictor)?;
+        let gain = Gain::new(&common, &elimination, Some(predictor))?;
+        Self::assemble(common, elimination, gain)
+    }
+
+    /// Set-up from a linear model in place of data: the same costs, constraints and code, with η = the
+    /// free part of [`PredictionModel`] to choose and its estimator in place of the past window. Steps
+    /// of a running loop are passed on with [`PredictiveProgram::observe`]; a program that never gets
+    /// any starts the estimator from the window of every moment.
+    ///
+    /// # Errors
+    /// A setting is out of range, a shape or size of the model does not fit, or the cost does not
+    /// determine the plan.
+    pub fn from_model(model: PredictionModel, stage: &StageSettings) -> Result<Self, ProgramError> {
+        model.check()?;
+        let shape = model.shape;
+        stage.check(shape.inputs, shape.outputs, shape.horizons.future)?;
+        let (sample_time_s, scales) = (model.sample_time_s, model.future_scales());
+        let common = Common::without_data(shape, sample_time_s, &scales, stage.clone());
+        let elimination = Elimination::of_model(model);
+        let gain = Gain::new(&common, &elimination, None)?;
+        Self::assemble(common, elimination, gain)
+    }
+
+    fn assemble(
+        common: Common,
+        elimination: Elimination,
+        gain: Gain,
+    ) -> Result<Self, ProgramError> {
         let spread = &gain.spread;
         let (n, k) = spread.shape();
 
@@ -162,7 +191,7 @@ impl CondensedProgram {
     /// the data span z so badly that digits would be lost, z is replaced by its coordinates.
     #[must_use]
     pub fn optimum_gain(&self) -> faer::MatRef<'_, f64> {
-        self.gain.matrix.as_ref()
+        self.gain.matrix.as_matrix()
     }
 
     /// x = (ζ, η) of the present plan.
@@ -207,13 +236,13 @@ fn clear_rounding(rows: &mut Mat<f64>) {
     }
 }
 
-impl DeepcProgram for CondensedProgram {
+impl PredictiveProgram for CondensedProgram {
     fn shape(&self) -> Shape {
         self.common.shape
     }
 
-    fn settings(&self) -> &DeepcSettings {
-        &self.common.settings
+    fn stage(&self) -> &StageSettings {
+        &self.common.stage
     }
 
     fn sample_time_s(&self) -> f64 {
@@ -224,12 +253,31 @@ impl DeepcProgram for CondensedProgram {
         &self.qp
     }
 
+    fn observe(&mut self, input: &[f64], disturbance: &[f64], output: &[f64]) {
+        if let Some(tracking) = self.elimination.tracking() {
+            tracking.observe(input, disturbance, output);
+        }
+    }
+
+    fn forget(&mut self) {
+        if let Some(tracking) = self.elimination.tracking() {
+            tracking.forget();
+        }
+    }
+
     fn set_moment(&mut self, moment: &Moment<'_>) -> Result<(), ProgramError> {
         self.common.stack(moment)?;
+        if let Some(tracking) = self.elimination.tracking() {
+            let disturbances = MeasuredDisturbances::or_none(moment.disturbances).past;
+            tracking.prepare(moment.past_inputs, disturbances, moment.past_outputs);
+        }
         let common = &mut self.common;
         common.plan.past_inconsistency = self.elimination.inconsistency(&common.known);
         self.gain
             .write_optimum(common, &self.elimination, &mut self.optimum);
+        if let Some(tracking) = self.elimination.tracking() {
+            tracking.keep_if_finite(&self.optimum);
+        }
         common
             .rows
             .bounds_from(&self.optimum, &mut self.lower, &mut self.upper);
@@ -312,6 +360,7 @@ impl DeepcProgram for CondensedProgram {
                 let rest = (self.model_cost(&x) - inputs - outputs).max(0.0);
                 (least_norm(free.predictor(), &target)?, slack, rest)
             }
+            Elimination::Model(_) => (Vec::new(), vec![0.0; known.len()], 0.0),
         };
         let common = &self.common;
         Some(recovered(common, &self.future, g, &slack, regularisation))

@@ -1,4 +1,4 @@
-//! What can be wrong with a `DeePC` problem.
+//! What can be wrong with a predictive control problem.
 
 use thiserror::Error;
 
@@ -171,6 +171,24 @@ pub enum ProgramError {
         expected_rows: usize,
         /// Columns expected.
         expected_columns: usize,
+    },
+    /// A size of a prediction model is 0.
+    #[error("`{field}` of the prediction model is 0; give at least 1")]
+    ModelSize {
+        /// Field of [`Shape`](crate::hankel::Shape).
+        field: &'static str,
+    },
+    /// The sizes of a prediction model's channels are not usable.
+    #[error(
+        "`{field}` of the prediction model is {found:?}; give {expected} finite values above 0"
+    )]
+    ModelScales {
+        /// `input_scales` or `output_scales`.
+        field: &'static str,
+        /// Values found.
+        found: Vec<f64>,
+        /// How many are expected.
+        expected: usize,
     },
     /// A factorisation left the range of the numbers.
     #[error(

@@ -8,8 +8,10 @@ use faer::{Mat, MatRef};
 use super::common::Common;
 use super::error::ProgramError;
 use super::free_past::FreePast;
+use super::model::{PredictionModel, Tracking};
 use super::past_factor::PastFactor;
 use super::regularisation::{Regularisation, RegularisedPart};
+use crate::hankel::Block;
 use crate::linalg;
 use crate::predictor::Predictor;
 
@@ -75,6 +77,8 @@ pub(super) enum Elimination {
     Charged(Box<(PastFactor, FutureMap)>),
     /// What the past fixes is free.
     Free(Box<FreePast>),
+    /// There is no g: a model predicts, and an estimator knows c.
+    Model(Box<(Tracking, FutureMap)>),
 }
 
 impl Elimination {
@@ -107,8 +111,17 @@ impl Elimination {
         }
     }
 
+    /// Without data.
+    pub fn of_model(model: PredictionModel) -> Self {
+        let charged = Mat::zeros(model.known.nrows(), 0);
+        let map = FutureMap::new(model.known, charged, model.free);
+        let preview = model.shape.rows_of(Block::FutureDisturbances).len();
+        Self::Model(Box::new((Tracking::new(model.estimator, preview), map)))
+    }
+
     pub fn map(&self) -> &FutureMap {
         match self {
+            Self::Model(model) => &model.1,
             Self::Charged(charged) => &charged.1,
             Self::Free(free) => &free.map,
         }
@@ -119,6 +132,15 @@ impl Elimination {
         match self {
             Self::Charged(charged) => charged.0.inconsistency(known),
             Self::Free(free) => free.inconsistency(known),
+            Self::Model(_) => 0.0,
+        }
+    }
+
+    /// The estimator of a model.
+    pub fn tracking(&mut self) -> Option<&mut Tracking> {
+        match self {
+            Self::Model(model) => Some(&mut model.0),
+            Self::Charged(_) | Self::Free(_) => None,
         }
     }
 
@@ -130,6 +152,7 @@ impl Elimination {
     /// Writes c for a known part.
     pub fn write_coordinates(&self, known: &[f64], c: &mut [f64]) {
         match self {
+            Self::Model(model) => model.0.write(known, c),
             Self::Charged(charged) => charged.0.write_coordinates(known, c),
             Self::Free(_) => c.copy_from_slice(known),
         }
@@ -139,7 +162,7 @@ impl Elimination {
     pub fn on_known(&self, gain: MatRef<'_, f64>) -> Mat<f64> {
         match self {
             Self::Charged(charged) => charged.0.on_past(gain),
-            Self::Free(_) => gain.to_owned(),
+            Self::Free(_) | Self::Model(_) => gain.to_owned(),
         }
     }
 
@@ -156,6 +179,7 @@ impl Elimination {
                 let (inputs, outputs) = common.slack_costs(&slack);
                 inputs + outputs
             }
+            Self::Model(_) => 0.0,
         }
     }
 }

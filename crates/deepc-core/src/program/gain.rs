@@ -9,6 +9,7 @@ use super::common::Common;
 use super::error::ProgramError;
 use super::future_map::Elimination;
 use super::stage_cost::StageCost;
+use crate::columns::{Columns, add_scaled};
 use crate::linalg;
 use crate::predictor::Predictor;
 
@@ -25,7 +26,7 @@ const PROBES: usize = 16;
 /// f* = K (c or z, weighted references, u(−1)).
 pub(super) struct Gain {
     /// K, n×(...).
-    pub matrix: Mat<f64>,
+    pub matrix: Columns,
     /// Entries of r with a weight.
     weighted: Vec<usize>,
     /// Positions in z of the entries of u(−1) that the cost of changes pulls to.
@@ -37,13 +38,19 @@ pub(super) struct Gain {
     /// Vᵀ = M R⁻¹, n×k.
     pub spread: Mat<f64>,
     parameters: Vec<f64>,
+    /// The first rows of K that look at one reference only: its number among those with a weight, and
+    /// the entry. Inputs without constraints are their own references where nothing else is weighed.
+    single: Vec<(usize, f64)>,
+    /// K's part of the references last seen.
+    reference_part: Vec<f64>,
+    reference_part_is_known: bool,
 }
 
 impl Gain {
     pub fn new(
         common: &Common,
         elimination: &Elimination,
-        predictor: &Predictor,
+        predictor: Option<&Predictor>,
     ) -> Result<Self, ProgramError> {
         let (map, cost) = (elimination.map(), &common.cost);
         let directions = map.directions();
@@ -57,8 +64,9 @@ impl Gain {
         let newest: Vec<_> = cost.newest_inputs().map(|(_, source, _)| source).collect();
 
         let mut known = elimination.on_known(on_coordinates.as_ref());
-        let direct =
-            elimination.is_direct() || agree(&known, &on_coordinates, elimination, predictor);
+        let direct = elimination.is_direct()
+            || predictor
+                .is_some_and(|predictor| agree(&known, &on_coordinates, elimination, predictor));
         let coordinates = (!direct).then(|| on_coordinates.ncols());
         let (first, newest) = if direct {
             for (k, &source) in newest.iter().enumerate() {
@@ -83,9 +91,13 @@ impl Gain {
         check_finite(&matrix)?;
         let mut v = directions.transpose().to_owned();
         solve_lower_triangular_in_place(least_squares.root.transpose(), v.as_mut(), Par::Seq);
+        let references = matrix.subcols(first.ncols(), weighted.len());
         Ok(Self {
+            single: leading_single_rows(references),
             parameters: vec![0.0; matrix.ncols()],
-            matrix,
+            reference_part: vec![0.0; n],
+            reference_part_is_known: false,
+            matrix: Columns::from_matrix(matrix.as_ref()),
             weighted,
             newest,
             coordinates,
@@ -95,6 +107,10 @@ impl Gain {
     }
 
     /// Writes f*.
+    ///
+    /// References seldom move, and their part of K is as large as the rest: its product is kept and
+    /// taken anew only when an entry differs in any bit. The sum has one order either way, so that
+    /// what was kept changes no bit of f*.
     pub fn write_optimum(&mut self, common: &Common, elimination: &Elimination, out: &mut [f64]) {
         let known = common.known.as_slice();
         let first = self.coordinates.unwrap_or(known.len());
@@ -104,14 +120,48 @@ impl Gain {
             Some(_) => elimination.write_coordinates(known, start),
         }
         let (references, newest) = rest.split_at_mut(self.weighted.len());
+        let mut differ = !self.reference_part_is_known;
         for (value, &position) in references.iter_mut().zip(&self.weighted) {
-            *value = common.reference[position];
+            let now = common.reference[position];
+            differ |= value.to_bits() != now.to_bits();
+            *value = now;
         }
         for (value, &position) in newest.iter_mut().zip(&self.newest) {
             *value = known[position];
         }
-        linalg::multiply(out, self.matrix.as_ref(), &self.parameters);
+        let matrix = &self.matrix;
+        let last = first + references.len();
+        if differ {
+            let (single, rest) = self.reference_part.split_at_mut(self.single.len());
+            for (part, &(column, factor)) in single.iter_mut().zip(&self.single) {
+                *part = factor * references[column];
+            }
+            matrix.multiply(rest, first, references);
+            self.reference_part_is_known = true;
+        }
+        matrix.multiply(out, 0, start);
+        for (j, &value) in newest.iter().enumerate() {
+            add_scaled(out, matrix.column(last + j), value);
+        }
+        for (out, part) in out.iter_mut().zip(&self.reference_part) {
+            *out += part;
+        }
     }
+}
+
+/// The first rows with at most one entry: its column and the entry.
+fn leading_single_rows(matrix: MatRef<'_, f64>) -> Vec<(usize, f64)> {
+    let rows = matrix.row_iter().map_while(|row| {
+        let mut entries = row.iter().enumerate().filter(|(_, value)| **value != 0.0);
+        match (entries.next(), entries.next()) {
+            (entry, None) => Some(entry.map_or((0, 0.0), |(column, &value)| (column, value))),
+            _ => None,
+        }
+    });
+    if matrix.ncols() == 0 {
+        return Vec::new();
+    }
+    rows.collect()
 }
 
 /// Whether the gain on z predicts what the gain on c predicts. Where the known part is spanned

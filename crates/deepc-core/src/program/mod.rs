@@ -18,7 +18,9 @@
 //! | [`SparseProgram`] | g, u, y, σ: c + (m+p)N + (m+q+p)`T_ini` + qN | (m+q+p)L + constraints | the data length |
 //! | [`CondensedProgram`] | at most (m+p)N | constraints | the horizons only |
 //!
-//! Both are [`DeepcProgram`]s, so a controller does not know which one it has.
+//! Both are [`PredictiveProgram`]s, so a controller does not know which one it has. A third one has no
+//! data: [`CondensedProgram::from_model`] takes the future from a linear model and a
+//! [`StateEstimator`] instead, with the same costs, constraints, solvers and code.
 
 mod common;
 mod condensed;
@@ -27,6 +29,7 @@ mod error;
 mod free_past;
 mod future_map;
 mod gain;
+mod model;
 mod options;
 mod output_predictor;
 mod past_factor;
@@ -37,15 +40,18 @@ mod rows;
 mod settings;
 mod sparse;
 mod stage_cost;
+mod stage_settings;
 
 pub use condensed::CondensedProgram;
 pub use error::{ProgramError, SettingsError};
+pub use model::{PredictionModel, StateEstimator};
 pub use options::{AffineConstraint, DisturbanceSlack, ProgramOptions, Steps, Terminal};
 pub use output_predictor::OutputPredictor;
 pub use plan::{MeasuredDisturbances, Moment, ObjectiveParts, Plan, PlanOrigin, Recovered};
 pub use regularisation::{Normalisation, Regularisation, RegularisedPart};
 pub use settings::{Bounds, DeepcSettings, OutputBounds, Slack, Softness};
 pub use sparse::SparseProgram;
+pub use stage_settings::StageSettings;
 
 use crate::hankel::Shape;
 use crate::solver::{QpProblem, QpSolution, QpSolver, QpVectors, SolveBudget};
@@ -53,7 +59,7 @@ use crate::solver::{QpProblem, QpSolution, QpSolver, QpVectors, SolveBudget};
 /// A past that hard slack cannot explain is called inconsistent above this relative residual.
 pub const CONSISTENCY_TOLERANCE: f64 = 1e-6;
 
-/// A `DeePC` problem whose matrices are fixed and whose vectors are rewritten every step.
+/// A predictive control problem, `DeePC` or on a model, whose matrices are fixed and whose vectors are rewritten every step.
 ///
 /// # Contract
 /// 1. [`qp`](Self::qp) never changes; a solver is set up with it once.
@@ -66,18 +72,31 @@ pub const CONSISTENCY_TOLERANCE: f64 = 1e-6;
 /// 5. All forms of one problem have the same optimum, for a past that is consistent with hard
 ///    slack: the condensed form projects one that is off by up to [`CONSISTENCY_TOLERANCE`] and
 ///    refuses others, the sparse form leaves the contradiction to the solver.
-pub trait DeepcProgram: Send {
+/// 6. A program that was never told a sample with [`observe`](Self::observe) plans from the moment
+///    alone. One that is told must be told every sample between two moments, or to
+///    [`forget`](Self::forget).
+pub trait PredictiveProgram: Send {
     /// Sizes m, p, `T_ini`, N.
     fn shape(&self) -> Shape;
 
-    /// The settings it was built from.
-    fn settings(&self) -> &DeepcSettings;
+    /// Its weights, bounds and options.
+    fn stage(&self) -> &StageSettings;
 
     /// Sample time of the data, in seconds.
     fn sample_time_s(&self) -> f64;
 
     /// The constant part of the quadratic program.
     fn qp(&self) -> &QpProblem;
+
+    /// Takes a sample (u(k), d(k), y(k)) of the running loop, m, q and p finite values (repaired
+    /// where the measurement was missing). Only for a program that remembers more than the past
+    /// window of the next moment; the others ignore it. Allocates nothing.
+    fn observe(&mut self, input: &[f64], disturbance: &[f64], output: &[f64]) {
+        let _ = (input, disturbance, output);
+    }
+
+    /// Forgets what was observed: the next moment's past window is all that is known.
+    fn forget(&mut self) {}
 
     /// Rewrites the vectors for one moment.
     ///

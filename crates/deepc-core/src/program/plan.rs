@@ -60,7 +60,7 @@ pub struct Plan {
     /// y, N×p.
     pub outputs: Mat<f64>,
     /// ‖u − `u_r‖²_R` + ‖y − `y_r‖²_Q` and the cost of input changes. The whole objective, with what
-    /// g and the slacks cost, is [`super::DeepcProgram::objective`].
+    /// g and the slacks cost, is [`super::PredictiveProgram::objective`].
     pub tracking: f64,
     /// Price of the violated soft constraints, Σ ρs + ½ws².
     pub soft_penalty: f64,
@@ -154,7 +154,7 @@ impl ObjectiveParts {
 /// the reduced matrix (ḡ).
 #[derive(Debug, Clone)]
 pub struct Recovered {
-    /// g, one entry per column of the data matrix.
+    /// g, one entry per column of the data matrix; none without data.
     pub g: Vec<f64>,
     /// `σ_u`, `T_ini`×m.
     pub input_slack: Mat<f64>,

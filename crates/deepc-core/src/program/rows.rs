@@ -1,7 +1,8 @@
 //! The constraints on the stacked future f = col(u, y), as rows of a quadratic program.
 
 use super::options::{AffineConstraint, Steps, Terminal};
-use super::settings::{Bounds, DeepcSettings};
+use super::settings::Bounds;
+use super::stage_settings::StageSettings;
 use crate::hankel::{Shape, stacked_position};
 use crate::solver::SoftPenalty;
 
@@ -31,6 +32,8 @@ pub(super) struct ConstraintRows {
     coefficients: Vec<f64>,
     /// Divisor of every row.
     pub scales: Vec<f64>,
+    /// 1/divisor: a product is a fraction of a division, and every step has two per row.
+    reciprocals: Vec<f64>,
     /// Bounds of the present step in the constraint's units, not divided.
     lower: Vec<f64>,
     upper: Vec<f64>,
@@ -51,7 +54,7 @@ struct NewRow<'a> {
 
 impl ConstraintRows {
     /// `future_scales`: size of every entry of f.
-    pub fn new(shape: Shape, settings: &DeepcSettings, future_scales: &[f64]) -> Self {
+    pub fn new(shape: Shape, settings: &StageSettings, future_scales: &[f64]) -> Self {
         let mut rows = Self {
             starts: vec![0],
             ..Self::default()
@@ -72,10 +75,11 @@ impl ConstraintRows {
                 size.fold(0.0, f64::max)
             })
             .collect();
+        rows.reciprocals = rows.scales.iter().map(|scale| 1.0 / scale).collect();
         rows
     }
 
-    fn add_boxes(&mut self, shape: Shape, settings: &DeepcSettings) {
+    fn add_boxes(&mut self, shape: Shape, settings: &StageSettings) {
         let steps = shape.horizons.future;
         for time in 0..steps {
             for (channel, bounds) in settings.input_bounds.iter().enumerate() {
@@ -197,8 +201,12 @@ impl ConstraintRows {
     }
 
     /// Value of a row at f, in the constraint's units.
+    #[inline]
     pub fn value(&self, row: usize, future: &[f64]) -> f64 {
         let range = self.starts[row]..self.starts[row + 1];
+        if range.len() == 1 {
+            return self.coefficients[range.start] * future[self.positions[range.start]];
+        }
         let mut value = 0.0;
         for k in range {
             value += self.coefficients[k] * future[self.positions[k]];
@@ -221,9 +229,9 @@ impl ConstraintRows {
     /// Bounds of the divided rows, measured from the future `start`.
     pub fn bounds_from(&self, start: &[f64], lower: &mut [f64], upper: &mut [f64]) {
         for row in 0..self.len() {
-            let (value, scale) = (self.value(row, start), self.scales[row]);
-            lower[row] = (self.lower[row] - value) / scale;
-            upper[row] = (self.upper[row] - value) / scale;
+            let (value, factor) = (self.value(row, start), self.reciprocals[row]);
+            lower[row] = (self.lower[row] - value) * factor;
+            upper[row] = (self.upper[row] - value) * factor;
         }
     }
 

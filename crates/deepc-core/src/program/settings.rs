@@ -4,8 +4,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::error::SettingsError;
-use super::options::{ProgramOptions, check_weight};
+use super::options::ProgramOptions;
 use super::regularisation::{Regularisation, RegularisedPart};
+use super::stage_settings::StageSettings;
 use crate::solver::SoftPenalty;
 
 /// How the past is matched: `λ_u‖σ_u‖²` and `λ_y‖σ_y‖²` of the paper's eq. (deepc), or not at all.
@@ -210,6 +211,18 @@ impl DeepcSettings {
         }
     }
 
+    /// What does not depend on how the future is predicted.
+    #[must_use]
+    pub fn stage(&self) -> StageSettings {
+        StageSettings {
+            input_weights: self.input_weights.clone(),
+            output_weights: self.output_weights.clone(),
+            input_bounds: self.input_bounds.clone(),
+            output_bounds: self.output_bounds.clone(),
+            options: self.options.clone(),
+        }
+    }
+
     /// Checks every field against its range, for m inputs, p outputs and a horizon of N steps.
     ///
     /// # Errors
@@ -220,39 +233,10 @@ impl DeepcSettings {
         outputs: usize,
         horizon: usize,
     ) -> Result<(), SettingsError> {
-        for (field, expected, found) in [
-            ("input_weights", inputs, self.input_weights.len()),
-            ("output_weights", outputs, self.output_weights.len()),
-            ("input_bounds", inputs, self.input_bounds.len()),
-            ("output_bounds", outputs, self.output_bounds.len()),
-        ] {
-            if expected != found {
-                return Err(SettingsError::Length {
-                    field,
-                    expected,
-                    found,
-                });
-            }
-        }
-        for (field, weights) in [
-            ("input_weights", &self.input_weights),
-            ("output_weights", &self.output_weights),
-        ] {
-            for (index, &found) in weights.iter().enumerate() {
-                check_weight(field, index, found)?;
-            }
-        }
+        self.stage().check(inputs, outputs, horizon)?;
         check_regularisation(&self.regularisation)?;
         self.input_slack.check("input_slack")?;
-        self.output_slack.check("output_slack")?;
-        for (index, bounds) in self.input_bounds.iter().enumerate() {
-            check_bounds("input_bounds", index, bounds)?;
-        }
-        for (index, output) in self.output_bounds.iter().enumerate() {
-            check_bounds("output_bounds", index, &output.bounds)?;
-            check_penalty("output_bounds.softness", index, output.softness)?;
-        }
-        self.options.check(inputs, outputs, horizon)
+        self.output_slack.check("output_slack")
     }
 }
 

@@ -2,13 +2,14 @@
 
 use faer::Mat;
 
-use super::DeepcProgram;
+use super::PredictiveProgram;
 use super::common::{Common, Ending};
 use super::error::ProgramError;
 use super::plan::{Moment, Plan, Recovered};
 use super::recover::recovered;
-use super::regularisation::RegularisedPart;
+use super::regularisation::{Regularisation, RegularisedPart};
 use super::settings::DeepcSettings;
+use super::stage_settings::StageSettings;
 use crate::hankel::{RANK_TOLERANCE, Shape};
 use crate::linalg;
 use crate::predictor::{Predictor, ReductionMethod};
@@ -69,8 +70,11 @@ enum Charge {
 }
 
 impl Charge {
-    fn new(common: &Common, predictor: &Predictor) -> Result<Self, ProgramError> {
-        let regularisation = &common.settings.regularisation;
+    fn new(
+        common: &Common,
+        predictor: &Predictor,
+        regularisation: &Regularisation,
+    ) -> Result<Self, ProgramError> {
         let lambda = regularisation.raw_lambda_g(common.columns);
         let refused = |part| ProgramError::Form {
             form: "the sparse form",
@@ -149,7 +153,7 @@ impl SparseProgram {
     /// A setting is out of range, or the regularisation is one that only the condensed form has.
     pub fn new(predictor: &Predictor, settings: &DeepcSettings) -> Result<Self, ProgramError> {
         let common = Common::new(predictor, settings)?;
-        let charge = Charge::new(&common, predictor)?;
+        let charge = Charge::new(&common, predictor, &settings.regularisation)?;
         let layout = Layout {
             columns: predictor.stacked().ncols(),
             future: common.shape.future_rows(),
@@ -235,13 +239,13 @@ impl SparseProgram {
     }
 }
 
-impl DeepcProgram for SparseProgram {
+impl PredictiveProgram for SparseProgram {
     fn shape(&self) -> Shape {
         self.common.shape
     }
 
-    fn settings(&self) -> &DeepcSettings {
-        &self.common.settings
+    fn stage(&self) -> &StageSettings {
+        &self.common.stage
     }
 
     fn sample_time_s(&self) -> f64 {

@@ -3,7 +3,7 @@
 use faer::{Mat, MatRef};
 
 use super::rows::newest_input;
-use super::settings::DeepcSettings;
+use super::stage_settings::StageSettings;
 use crate::hankel::{Shape, stacked_position};
 
 /// The quadratic cost (f − r)ᵀW(f − r) + Δuᵀ S Δu of a stacked future f = col(u, y) with the
@@ -32,7 +32,7 @@ impl TrackingCost {
 }
 
 impl StageCost {
-    pub fn new(shape: Shape, settings: &DeepcSettings) -> Self {
+    pub fn new(shape: Shape, settings: &StageSettings) -> Self {
         let options = &settings.options;
         let steps = shape.horizons.future;
         let block = |weights: &[f64], factors: &[Vec<f64>]| -> Vec<f64> {

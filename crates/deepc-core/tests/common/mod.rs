@@ -3,7 +3,7 @@
 
 use deepc_core::data::Dataset;
 use deepc_core::hankel::{HankelMatrix, Horizons, PersistentlyExciting};
-use deepc_core::program::{DeepcProgram, Plan};
+use deepc_core::program::{Plan, PredictiveProgram};
 use faer::{Col, Mat};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -128,7 +128,7 @@ pub struct Solved {
 
 impl Solved {
     /// The present plan of a program; NaN if it is not usable.
-    pub fn of(program: &dyn DeepcProgram) -> Self {
+    pub fn of(program: &dyn PredictiveProgram) -> Self {
         Self {
             plan: program.plan().clone(),
             objective: program.objective().unwrap_or(f64::NAN),

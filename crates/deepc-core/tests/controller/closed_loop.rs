@@ -5,7 +5,7 @@ use deepc_core::controller::{
     contract, run_closed_loop,
 };
 use deepc_core::program::{
-    AffineConstraint, Bounds, CondensedProgram, DeepcProgram, OutputBounds, Slack, Softness,
+    AffineConstraint, Bounds, CondensedProgram, OutputBounds, PredictiveProgram, Slack, Softness,
     SparseProgram, Steps,
 };
 use deepc_core::solver::{

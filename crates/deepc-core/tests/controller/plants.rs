@@ -10,7 +10,7 @@ use deepc_core::data::Dataset;
 use deepc_core::hankel::{HankelMatrix, Horizons};
 use deepc_core::predictor::Predictor;
 use deepc_core::program::{
-    Bounds, CondensedProgram, DeepcProgram, DeepcSettings, OutputBounds, ProgramOptions,
+    Bounds, CondensedProgram, DeepcSettings, OutputBounds, PredictiveProgram, ProgramOptions,
     Regularisation, Slack, SparseProgram,
 };
 use deepc_core::solver::{

@@ -7,7 +7,7 @@ use deepc_core::controller::{
     Controller, DeepcController, FallbackPolicy, Fault, Origin, RecedingHorizonSettings, contract,
     run_closed_loop,
 };
-use deepc_core::program::{DeepcProgram, SparseProgram};
+use deepc_core::program::{PredictiveProgram, SparseProgram};
 use deepc_core::solver::{ClarabelSettings, ClarabelSolver, QpStatus, SolveBudget};
 
 use crate::plants::{

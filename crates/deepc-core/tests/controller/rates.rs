@@ -4,7 +4,7 @@ use deepc_core::controller::{
     Controller, DeepcController, FallbackPolicy, Fault, Origin, Planner, RecedingHorizonSettings,
     contract, run_closed_loop,
 };
-use deepc_core::program::{Bounds, DeepcProgram, DeepcSettings, SparseProgram};
+use deepc_core::program::{Bounds, DeepcSettings, PredictiveProgram, SparseProgram};
 use deepc_core::solver::QpStatus;
 
 use crate::plants::{

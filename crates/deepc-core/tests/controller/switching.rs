@@ -7,7 +7,7 @@ use deepc_core::controller::{
 use deepc_core::data::Dataset;
 use deepc_core::hankel::{HankelMatrix, Horizons};
 use deepc_core::predictor::{Predictor, Schedule, ScheduledPredictors};
-use deepc_core::program::{CondensedProgram, DeepcProgram, DeepcSettings};
+use deepc_core::program::{CondensedProgram, DeepcSettings, PredictiveProgram};
 use deepc_core::solver::{ActiveSet, ActiveSetSettings};
 
 use crate::common;
@@ -30,8 +30,8 @@ fn a_program_that_takes_over_keeps_the_window_and_decides_as_if_it_had_always_be
     let old = switched
         .switch_planner(planner(&predictor(), &other))
         .unwrap();
-    assert_eq!(old.program().settings(), &settings());
-    assert_eq!(switched.program().settings(), &other);
+    assert_eq!(old.program().stage(), &settings().stage());
+    assert_eq!(switched.program().stage(), &other.stage());
 
     // A controller of the other program that saw the same samples.
     let mut fresh =

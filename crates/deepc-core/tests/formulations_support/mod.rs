@@ -7,8 +7,8 @@ use deepc_core::data::Dataset;
 use deepc_core::hankel::{HankelMatrix, Horizons};
 use deepc_core::predictor::Predictor;
 use deepc_core::program::{
-    Bounds, CondensedProgram, DeepcProgram, DeepcSettings, MeasuredDisturbances, Moment,
-    OutputBounds, ProgramOptions, Regularisation, Slack, SparseProgram,
+    Bounds, CondensedProgram, DeepcSettings, MeasuredDisturbances, Moment, OutputBounds,
+    PredictiveProgram, ProgramOptions, Regularisation, Slack, SparseProgram,
 };
 use deepc_core::solver::{
     ActiveSet, ActiveSetSettings, QpMatrix, QpProblem, QpSolver, QpVectors, SolveBudget,
@@ -213,7 +213,7 @@ fn scale_columns(series: &mut Mat<f64>, scales: &[f64]) {
 }
 
 pub fn solve(
-    program: &mut dyn DeepcProgram,
+    program: &mut dyn PredictiveProgram,
     situation: &Situation,
     solver: fn(&QpProblem) -> Box<dyn QpSolver>,
 ) -> Solved {

@@ -6,7 +6,7 @@ use deepc_core::data::Dataset;
 use deepc_core::hankel::{HankelMatrix, Horizons};
 use deepc_core::predictor::Predictor;
 use deepc_core::program::{
-    Bounds, CondensedProgram, DeepcProgram, DeepcSettings, OutputBounds, ProgramOptions, Slack,
+    Bounds, CondensedProgram, DeepcSettings, OutputBounds, PredictiveProgram, ProgramOptions, Slack,
 };
 use deepc_core::solver::{ActiveSet, ActiveSetSettings, SolveBudget};
 

@@ -8,7 +8,7 @@ use faer::{Mat, Par, Side};
 use super::super::error::SolverError;
 use super::super::problem::{QpMatrix, QpProblem};
 use super::bounds::Price;
-use super::columns::Columns;
+use crate::columns::Columns;
 use crate::linalg;
 
 /// With P = `LLᵀ`, V = L⁻¹Aᵀ and rows scaled to the length 1 of their column of V.

@@ -7,9 +7,9 @@
 
 use super::super::problem::OwnedVectors;
 use super::bounds::{Row, RowSide, RowState};
-use super::columns::dot;
 use super::constant::Constant;
 use super::factor::PackedCholesky;
+use crate::columns::dot;
 
 /// A pivot below this part of its diagonal entry is recomputed from V.
 const DOUBTFUL_PIVOT: f64 = 1e-6;
@@ -74,6 +74,9 @@ pub(in crate::solver) struct Dual {
     pub combination: Vec<f64>,
     /// How far every row is from what its state demands, beyond rounding; 0 if it is not.
     pub excess: Vec<f64>,
+    /// How far every multiplier is from what its row's state allows, where rows are exchanged.
+    pub(super) discord: Vec<f64>,
+    pub(super) leaving: Vec<usize>,
     /// (row, μ) of the rows that push.
     pub pushing: Vec<(usize, f64)>,
     pub best: Snapshot,
@@ -119,6 +122,8 @@ impl Dual {
             solution: vec![0.0; r],
             combination: vec![0.0; r],
             excess: vec![0.0; r],
+            discord: vec![0.0; r],
+            leaving: Vec::with_capacity(r),
             pushing: Vec::with_capacity(r),
             best: Snapshot {
                 objective: f64::INFINITY,
@@ -155,11 +160,6 @@ impl Dual {
             row.lower = lower;
             row.upper = upper;
         }
-    }
-
-    /// Whether rows push from an earlier step.
-    pub fn is_warm(&self) -> bool {
-        !(self.factored.is_empty() && self.capped.is_empty())
     }
 
     /// Forgets which rows push.

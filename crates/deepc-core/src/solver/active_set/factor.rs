@@ -5,36 +5,35 @@
     reason = "a loop is compiled for the processor at hand only where it is inlined into `dispatch`"
 )]
 
-use pulp::Arch;
+use pulp::NullaryFnOnce;
 
-use super::columns::{add_scaled, dot};
+use crate::columns::{add_scaled, dot, widely};
 
 /// L of a growing and shrinking matrix M = `LLᵀ`, k×k, with room for a capacity fixed at set-up.
 ///
-/// Rows are packed one behind the other, so that joining, forward and back substitution run
-/// along slices and cost k² operations each. The diagonal holds 1/Lᵢᵢ.
+/// Columns are packed one behind the other, each with room for all rows that may join, so that
+/// substitutions and the rotations after a leave run along slices: k² operations each, in vector
+/// code.
 #[derive(Debug, Clone)]
 pub(super) struct PackedCholesky {
+    /// Column j from its diagonal down.
     entries: Vec<f64>,
+    capacity: usize,
     size: usize,
-    /// Of a leaving column, what the rows below keep.
-    leaving: Vec<f64>,
-    /// Cosine and sine of the rotations that take it up.
-    rotations: Vec<(f64, f64)>,
-}
-
-/// Where row i begins.
-fn start(i: usize) -> usize {
-    i * (i + 1) / 2
+    /// 1/Lᵢᵢ.
+    reciprocals: Vec<f64>,
+    /// The row laid out by [`Self::prepare`]; of a leaving column, what the rows below keep.
+    next: Vec<f64>,
 }
 
 impl PackedCholesky {
     pub fn with_capacity(capacity: usize) -> Self {
         Self {
-            entries: vec![0.0; start(capacity)],
+            entries: vec![0.0; capacity * (capacity + 1) / 2],
+            capacity,
             size: 0,
-            leaving: vec![0.0; capacity],
-            rotations: vec![(1.0, 0.0); capacity],
+            reciprocals: vec![0.0; capacity],
+            next: vec![0.0; capacity],
         }
     }
 
@@ -42,102 +41,239 @@ impl PackedCholesky {
         self.size = 0;
     }
 
+    /// Where column j begins.
+    #[inline(always)]
+    fn start(&self, j: usize) -> usize {
+        j * (2 * self.capacity + 1 - j) / 2
+    }
+
+    /// Column j from its diagonal down.
+    #[inline(always)]
+    fn column(&self, j: usize) -> &[f64] {
+        let start = self.start(j);
+        &self.entries[start..start + self.size - j]
+    }
+
     /// Lays out the next row: `couplings` are its k entries of M beside the diagonal. Returns
     /// their share in the diagonal, ‖L⁻¹·couplings‖². The row counts only after
     /// [`Self::append`].
     pub fn prepare(&mut self, couplings: impl Iterator<Item = f64>) -> f64 {
-        let (rows, next) = self.entries.split_at_mut(start(self.size));
-        let next = &mut next[..self.size];
-        for (entry, coupling) in next.iter_mut().zip(couplings) {
+        let mut next = std::mem::take(&mut self.next);
+        let row = &mut next[..self.size];
+        for (entry, coupling) in row.iter_mut().zip(couplings) {
             *entry = coupling;
         }
-        Arch::new().dispatch(
-            #[inline(always)]
-            || {
-                forward(rows, next);
-                dot(next, next)
-            },
-        )
+        let share = widely(Forward { factor: self, row });
+        self.next = next;
+        share
     }
 
     /// The couplings of the prepared row expressed by the present rows: x = M⁻¹·couplings.
     pub fn combination(&self, x: &mut [f64]) {
-        let (rows, next) = self.entries.split_at(start(self.size));
-        x.copy_from_slice(&next[..self.size]);
-        backward(rows, x);
+        x.copy_from_slice(&self.next[..self.size]);
+        self.backward(x);
     }
 
     /// Lets the prepared row join with what its couplings left of its diagonal, a `pivot` > 0.
     pub fn append(&mut self, pivot: f64) {
-        self.entries[start(self.size) + self.size] = 1.0 / pivot.sqrt();
+        for j in 0..self.size {
+            let end = self.start(j) + self.size - j;
+            self.entries[end] = self.next[j];
+        }
+        let diagonal = pivot.sqrt();
+        let start = self.start(self.size);
+        self.entries[start] = diagonal;
+        self.reciprocals[self.size] = 1.0 / diagonal;
         self.size += 1;
     }
 
     /// x ← M⁻¹x.
     pub fn solve(&self, x: &mut [f64]) {
-        let rows = &self.entries[..start(self.size)];
-        Arch::new().dispatch(
-            #[inline(always)]
-            || {
-                forward(rows, x);
-                backward(rows, x);
-            },
-        );
+        widely(Solve { factor: self, x });
     }
 
     /// Removes row and column `position`: the rows below lose a column d, and with it d·dᵀ,
-    /// which is rotated back into them.
+    /// which is rotated back into them, one column after the other.
     pub fn remove(&mut self, position: usize) {
-        for i in position + 1..self.size {
-            let (from, to) = (start(i), start(i - 1));
-            self.leaving[i - 1 - position] = self.entries[from + position];
-            self.entries.copy_within(from..from + position, to);
-            let behind = from + position + 1..=from + i;
-            self.entries.copy_within(behind, to + position);
+        for j in 0..position {
+            let start = self.start(j);
+            let behind = start + position + 1 - j..start + self.size - j;
+            self.entries.copy_within(behind, start + position - j);
         }
+        let count = self.size - position - 1;
+        let leaving = self.start(position) + 1;
+        self.next[..count].copy_from_slice(&self.entries[leaving..leaving + count]);
         self.size -= 1;
-        for i in 0..self.size - position {
-            let mut left = self.leaving[i];
-            let begin = start(position + i) + position;
-            let (diagonal, row) = self.entries[begin..=begin + i]
-                .split_last_mut()
-                .expect("a row holds its diagonal");
-            for (entry, &(cosine, sine)) in row.iter_mut().zip(&self.rotations) {
-                let old = *entry;
-                *entry = cosine * old + sine * left;
-                left = cosine * left - sine * old;
+        widely(RotateIn {
+            factor: self,
+            position,
+        });
+    }
+
+    /// Moves the columns behind `position` forward by one and rotates d, which is in `next`, into
+    /// them.
+    #[inline(always)]
+    fn rotate_in(&mut self, position: usize) {
+        let mut left = self.next[0];
+        for j in position..self.size {
+            let (to, from) = (self.start(j), self.start(j + 1));
+            let length = self.size - j;
+            let leaving = &mut self.next[j - position..self.size - position];
+            let (before, behind) = self.entries.split_at_mut(from);
+            let (target, source) = (&mut before[to..to + length], &behind[..length]);
+            let diagonal = source[0];
+            let reciprocal = 1.0 / (diagonal * diagonal + left * left).sqrt();
+            let (cosine, sine) = (diagonal * reciprocal, left * reciprocal);
+            // Ahead of the loop, so that the next rotation need not wait for it.
+            if length > 1 {
+                left = cosine * leaving[1] - sine * source[1];
             }
-            let old = 1.0 / *diagonal;
-            let length = (old * old + left * left).sqrt();
-            self.rotations[i] = (old / length, left / length);
-            *diagonal = 1.0 / length;
+            for ((target, source), left) in target.iter_mut().zip(source).zip(leaving) {
+                let old = *left;
+                *target = cosine * source + sine * old;
+                *left = cosine * old - sine * source;
+            }
+            self.reciprocals[j] = reciprocal;
+        }
+    }
+
+    /// x ← L⁻¹x, four columns per pass over what is below them.
+    #[inline(always)]
+    fn forward(&self, x: &mut [f64]) {
+        let fours = x.len() - x.len() % 4;
+        for j in (0..fours).step_by(4) {
+            let Some((head, tail)) = x[j..].split_first_chunk_mut::<4>() else {
+                return;
+            };
+            let block = Block::of(self, j);
+            let [a, b, c, d] = head;
+            let [p, q, r, s] = block.columns;
+            let [u, v, w, z] = block.reciprocals;
+            *a *= u;
+            *b = (*b - p[1] * *a) * v;
+            *c = (*c - (p[2] * *a + q[1] * *b)) * w;
+            *d = (*d - ((p[3] * *a + q[2] * *b) + r[1] * *c)) * z;
+            let below = p[4..].iter().zip(&q[3..]).zip(&r[2..]).zip(&s[1..]);
+            for (x, (((p, q), r), s)) in tail.iter_mut().zip(below) {
+                *x -= (p * *a + q * *b) + (r * *c + s * *d);
+            }
+        }
+        for j in fours..x.len() {
+            x[j] *= self.reciprocals[j];
+            let (above, below) = x.split_at_mut(j + 1);
+            add_scaled(below, &self.column(j)[1..], -above[j]);
+        }
+    }
+
+    /// x ← L⁻ᵀx.
+    #[inline(always)]
+    fn backward(&self, x: &mut [f64]) {
+        let fours = x.len() - x.len() % 4;
+        for j in (fours..x.len()).rev() {
+            let below = dot(&self.column(j)[1..], &x[j + 1..]);
+            x[j] = (x[j] - below) * self.reciprocals[j];
+        }
+        for j in (0..fours).step_by(4).rev() {
+            let block = Block::of(self, j);
+            let Some((head, tail)) = x[j..].split_first_chunk_mut::<4>() else {
+                return;
+            };
+            let [p, q, r, s] = block.columns;
+            let [u, v, w, z] = block.reciprocals;
+            let [a, b, c, d] = head;
+            let below = four_dots([&p[4..], &q[3..], &r[2..], &s[1..]], tail);
+            *d = (*d - below[3]) * z;
+            *c = (*c - below[2] - r[1] * *d) * w;
+            *b = (*b - below[1] - (q[1] * *c + q[2] * *d)) * v;
+            *a = (*a - below[0] - (p[1] * *b + (p[2] * *c + p[3] * *d))) * u;
         }
     }
 }
 
-/// x ← L⁻¹x.
-#[inline(always)]
-fn forward(rows: &[f64], x: &mut [f64]) {
-    let mut rest = rows;
-    for i in 0..x.len() {
-        let (row, below) = rest.split_at(i + 1);
-        let (before, at) = x.split_at_mut(i);
-        at[0] = (at[0] - dot(&row[..i], before)) * row[i];
-        rest = below;
+/// row ← L⁻¹·row; its squared length.
+struct Forward<'a> {
+    factor: &'a PackedCholesky,
+    row: &'a mut [f64],
+}
+
+impl NullaryFnOnce for Forward<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn call(self) -> f64 {
+        self.factor.forward(self.row);
+        dot(self.row, self.row)
     }
 }
 
-/// x ← L⁻ᵀx.
-#[inline(always)]
-fn backward(rows: &[f64], x: &mut [f64]) {
-    let mut rest = rows;
-    for i in (0..x.len()).rev() {
-        let (above, row) = rest.split_at(start(i));
-        let (before, at) = x.split_at_mut(i);
-        at[0] *= row[i];
-        add_scaled(before, &row[..i], -at[0]);
-        rest = above;
+/// x ← M⁻¹x.
+struct Solve<'a> {
+    factor: &'a PackedCholesky,
+    x: &'a mut [f64],
+}
+
+impl NullaryFnOnce for Solve<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.factor.forward(self.x);
+        self.factor.backward(self.x);
     }
+}
+
+struct RotateIn<'a> {
+    factor: &'a mut PackedCholesky,
+    position: usize,
+}
+
+impl NullaryFnOnce for RotateIn<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.factor.rotate_in(self.position);
+    }
+}
+
+/// Four neighbouring columns.
+struct Block<'a> {
+    columns: [&'a [f64]; 4],
+    reciprocals: [f64; 4],
+}
+
+impl<'a> Block<'a> {
+    #[inline(always)]
+    fn of(factor: &'a PackedCholesky, j: usize) -> Self {
+        let number = [j, j + 1, j + 2, j + 3];
+        Self {
+            columns: number.map(|j| factor.column(j)),
+            reciprocals: number.map(|j| factor.reciprocals[j]),
+        }
+    }
+}
+
+/// Inner products of four vectors with x, each as [`dot`] sums it.
+#[inline(always)]
+fn four_dots(vectors: [&[f64]; 4], x: &[f64]) -> [f64; 4] {
+    let (chunks, rest) = x.as_chunks::<8>();
+    let [a, b, c, d] = vectors.map(|vector| vector.as_chunks::<8>());
+    let mut sums = [[0.0; 8]; 4];
+    let whole = a.0.iter().zip(b.0).zip(c.0).zip(d.0);
+    for (x, (((a, b), c), d)) in chunks.iter().zip(whole) {
+        for lane in 0..8 {
+            sums[0][lane] += a[lane] * x[lane];
+            sums[1][lane] += b[lane] * x[lane];
+            sums[2][lane] += c[lane] * x[lane];
+            sums[3][lane] += d[lane] * x[lane];
+        }
+    }
+    let mut totals = sums.map(|[a, b, c, d, e, f, g, h]| ((a + e) + (b + f)) + ((c + g) + (d + h)));
+    for (total, vector) in totals.iter_mut().zip([a.1, b.1, c.1, d.1]) {
+        let rest: f64 = vector.iter().zip(rest).map(|(v, x)| v * x).sum();
+        *total += rest;
+    }
+    totals
 }
 
 #[cfg(test)]

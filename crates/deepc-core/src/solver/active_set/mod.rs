@@ -11,18 +11,19 @@
 //! | `factor` | a Cholesky factor that rows join and leave |
 //! | `dual` | multipliers, values and factor at one step, kept for the next |
 //! | `values` | the values of all rows, and which rows they contradict |
-//! | `rounds` | many rows at a time: nearly always all that is needed |
+//! | `exchange` | rows that push wrongly out, violated ones in: nearly always all that is needed |
+//! | `rounds` | many rows at a time while the dual cost falls, where that does not settle |
 //! | `descent` | one row at a time, with an end: degenerate and contradicting rows |
 //! | `verdict` | x and its certificate |
 //! | `guess` | multipliers that come from elsewhere (ADMM) |
-//! | `columns`, `clock` | loops over dense columns; the budget |
+//! | `clock` | the budget |
 
 mod bounds;
 mod clock;
-mod columns;
 mod constant;
 mod descent;
 mod dual;
+mod exchange;
 mod factor;
 mod guess;
 mod rounds;
@@ -38,6 +39,7 @@ use super::{QpSolution, QpSolver, QpStatus, SolveBudget};
 pub(super) use clock::Clock;
 pub(super) use constant::Constant;
 pub(super) use dual::Dual;
+use exchange::exchange;
 pub(super) use rounds::rounds;
 
 /// Settings of [`ActiveSet`].
@@ -115,25 +117,20 @@ impl ActiveSet {
             Screening::Infeasible => return QpStatus::Infeasible,
             Screening::Proceed => {}
         }
-        let warm = self.dual.is_warm();
-        let mut status = self.attempt(clock);
-        if matches!(status, QpStatus::NumericalError | QpStatus::Inaccurate) && warm {
-            // What was carried over from earlier steps may be to blame.
+        let status = self.attempt(true, clock);
+        if matches!(status, QpStatus::NumericalError | QpStatus::Inaccurate) {
+            // What was carried over from earlier steps may be to blame, or rows that were exchanged
+            // although they nearly depend on each other.
             self.dual.clear();
-            status = self.attempt(clock);
+            return self.attempt(false, clock);
         }
         status
     }
 
-    fn attempt(&mut self, clock: &mut Clock) -> QpStatus {
+    fn attempt(&mut self, exchanging: bool, clock: &mut Clock) -> QpStatus {
         self.dual.load(&self.vectors, &mut self.solution.primal);
         self.dual.start();
-        let found = rounds(&mut self.dual, clock).and_then(|optimal| {
-            if optimal {
-                return Ok(());
-            }
-            descent::descend(&mut self.dual, &mut self.left_out, clock)
-        });
+        let found = self.search(exchanging, clock);
         if let Err(status) = found {
             return status;
         }
@@ -144,6 +141,17 @@ impl ActiveSet {
             &mut self.solution,
         );
         self.solution.grade(self.settings.tolerance)
+    }
+
+    /// The fast ways first, then the one that ends.
+    fn search(&mut self, exchanging: bool, clock: &mut Clock) -> Result<(), QpStatus> {
+        if exchanging && exchange(&mut self.dual, clock)? {
+            return Ok(());
+        }
+        if rounds(&mut self.dual, clock)? {
+            return Ok(());
+        }
+        descent::descend(&mut self.dual, &mut self.left_out, clock)
     }
 }
 

@@ -5,11 +5,11 @@
     reason = "a loop is compiled for the processor at hand only where it is inlined into `dispatch`"
 )]
 
-use pulp::Arch;
+use pulp::NullaryFnOnce;
 
 use super::bounds::RowState;
-use super::columns::position_of_largest;
 use super::dual::Dual;
+use crate::columns::{position_of_largest, widely};
 
 /// Rounding a value may have, relative to the numbers it is made of.
 const ROUNDING: f64 = 1e-12;
@@ -29,6 +29,11 @@ impl Dual {
     /// values show that they could solve it better.
     pub fn evaluate(&mut self) {
         self.compute_values();
+        self.refine();
+    }
+
+    /// The same where the values have been computed.
+    pub fn refine(&mut self) {
         if self.residual_of_factored() <= REFINE * self.size() {
             return;
         }
@@ -41,7 +46,7 @@ impl Dual {
         }
     }
 
-    fn compute_values(&mut self) {
+    pub fn compute_values(&mut self) {
         self.pushing.clear();
         for &i in self
             .factored
@@ -117,21 +122,14 @@ impl Dual {
     /// Fills `excess`: by how much the values contradict the states.
     pub fn measure_excess(&mut self) {
         let size = self.size();
-        let (excess, values) = (&mut self.excess, &self.values);
-        let bounds = self.lowers.iter().zip(&self.uppers);
-        let units = &self.constant.reciprocals;
-        Arch::new().dispatch(
-            #[inline(always)]
-            || {
-                let rows = values.iter().zip(bounds).zip(units);
-                for (excess, ((&value, (&lower, &upper)), &unit)) in excess.iter_mut().zip(rows) {
-                    let (above, below) = (value - upper, lower - value);
-                    let violation = if above > below { above } else { below };
-                    let allowed = tolerance(size, value, unit);
-                    *excess = if violation > allowed { violation } else { 0.0 };
-                }
-            },
-        );
+        widely(Excess {
+            out: &mut self.excess,
+            values: &self.values,
+            lowers: &self.lowers,
+            uppers: &self.uppers,
+            units: &self.constant.reciprocals,
+            size,
+        });
         for &i in &self.factored {
             self.excess[i] = 0.0;
         }
@@ -149,6 +147,32 @@ impl Dual {
     /// The row of the largest excess, if any has one.
     pub fn worst(&self) -> Option<usize> {
         position_of_largest(&self.excess)
+    }
+}
+
+/// How far every value is beyond its bounds, if that is more than rounding.
+struct Excess<'a> {
+    out: &'a mut [f64],
+    values: &'a [f64],
+    lowers: &'a [f64],
+    uppers: &'a [f64],
+    units: &'a [f64],
+    size: f64,
+}
+
+impl NullaryFnOnce for Excess<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let bounds = self.lowers.iter().zip(self.uppers);
+        let rows = self.values.iter().zip(bounds).zip(self.units);
+        for (excess, ((&value, (&lower, &upper)), &unit)) in self.out.iter_mut().zip(rows) {
+            let (above, below) = (value - upper, lower - value);
+            let violation = if above > below { above } else { below };
+            let allowed = tolerance(self.size, value, unit);
+            *excess = if violation > allowed { violation } else { 0.0 };
+        }
     }
 }
 

@@ -3,8 +3,8 @@
 use super::super::QpSolution;
 use super::super::certificate::{CertificateWork, CostParts, RowPoint, RowSums, largest_saving};
 use super::super::problem::{OwnedVectors, QpProblem};
-use super::columns::weighted_square;
 use super::dual::Dual;
+use crate::columns::weighted_square;
 use crate::linalg;
 
 /// Relative residual that is good enough not to be improved.

@@ -5,12 +5,19 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use serde::Serialize;
 
+/// Creates a folder and those above it.
+///
+/// # Errors
+/// It cannot be created.
 pub fn create_folder(path: &Path) -> Result<()> {
     std::fs::create_dir_all(path)
         .with_context(|| format!("cannot create the folder {}", path.display()))
 }
 
 /// Writes beside the target first and renames, so that nothing ever leaves half a file.
+///
+/// # Errors
+/// The file cannot be written; what was there before is still there.
 pub fn write_whole(path: &Path, contents: &str) -> Result<()> {
     let partial = path.with_added_extension("partial");
     let written = std::fs::write(&partial, contents).and_then(|()| std::fs::rename(&partial, path));
@@ -21,6 +28,10 @@ pub fn write_whole(path: &Path, contents: &str) -> Result<()> {
     })
 }
 
+/// Writes JSON with a line end.
+///
+/// # Errors
+/// As [`write_whole`].
 pub fn write_json<T: Serialize + ?Sized>(path: &Path, value: &T) -> Result<()> {
     write_whole(path, &(serde_json::to_string_pretty(value)? + "\n"))
 }

@@ -1,4 +1,4 @@
-//! The receding-horizon `DeePC` controller.
+//! The receding-horizon controller.
 
 use std::time::Instant;
 
@@ -15,10 +15,14 @@ use super::statistics::StepStatistics;
 use super::step::{Fault, Origin, Step};
 use crate::hankel::Shape;
 use crate::predictor::Predictor;
-use crate::program::{Bounds, DeepcProgram, DeepcSettings, MeasuredDisturbances, Moment};
+use crate::program::{Bounds, DeepcSettings, MeasuredDisturbances, Moment, PredictiveProgram};
 use crate::solver::QpSolver;
 
-/// `DeePC` in closed loop: past window → program vectors → unconstrained optimum or solver →
+/// The receding-horizon controller as `DeePC`'s papers know it: [`RecedingHorizonController::condensed`]
+/// builds it from data.
+pub type DeepcController = RecedingHorizonController;
+
+/// A predictive program, `DeePC` or on a model, in closed loop: past window → program vectors → unconstrained optimum or solver →
 /// step.
 ///
 /// | situation | input |
@@ -37,7 +41,7 @@ use crate::solver::QpSolver;
 /// it (a missing disturbance by the one before), and counted in [`Step::repaired_samples`] as long
 /// as it stays there. Without a prediction, also because another input than the plan's was
 /// decided or applied, the window has to fill again.
-pub struct DeepcController {
+pub struct RecedingHorizonController {
     /// All of one shape and sample time; one acts.
     planners: Vec<Planner>,
     active: usize,
@@ -54,8 +58,8 @@ pub struct DeepcController {
     step: Step,
 }
 
-impl DeepcController {
-    /// The controller for the control loop: the condensed program and the active-set back end.
+impl RecedingHorizonController {
+    /// `DeePC` for the control loop: the condensed program of a predictor and the active-set back end.
     ///
     /// # Errors
     /// A setting is out of range, or data and weights do not make a program.
@@ -67,12 +71,12 @@ impl DeepcController {
         Self::with_planner(Planner::condensed(predictor, settings)?, horizon)
     }
 
-    /// Puts a program and a solver set up with its [`DeepcProgram::qp`] together.
+    /// Puts a program and a solver set up with its [`PredictiveProgram::qp`] together.
     ///
     /// # Errors
     /// A setting is out of range, or the solver was set up for another program.
     pub fn new(
-        program: Box<dyn DeepcProgram>,
+        program: Box<dyn PredictiveProgram>,
         solver: Box<dyn QpSolver>,
         settings: RecedingHorizonSettings,
     ) -> Result<Self, ControllerError> {
@@ -142,7 +146,7 @@ impl DeepcController {
     /// nothing changes then.
     pub fn switch_program(
         &mut self,
-        program: Box<dyn DeepcProgram>,
+        program: Box<dyn PredictiveProgram>,
         solver: Box<dyn QpSolver>,
     ) -> Result<Planner, ControllerError> {
         self.switch_planner(Planner::new(program, solver)?)
@@ -153,15 +157,17 @@ impl DeepcController {
     ///
     /// # Errors
     /// The program has another shape or sample time; nothing changes then.
-    pub fn switch_planner(&mut self, planner: Planner) -> Result<Planner, ControllerError> {
+    pub fn switch_planner(&mut self, mut planner: Planner) -> Result<Planner, ControllerError> {
         let active = &mut self.planners[self.active];
         active.check_replacement(&planner)?;
+        // What it may have observed before is another past.
+        planner.forget_samples();
         Ok(std::mem::replace(active, planner))
     }
 
     /// The program, for its last plan and what it can recover.
     #[must_use]
-    pub fn program(&self) -> &dyn DeepcProgram {
+    pub fn program(&self) -> &dyn PredictiveProgram {
         self.planners[self.active].program()
     }
 
@@ -208,6 +214,18 @@ impl DeepcController {
         if std::mem::take(&mut self.awaits_sample) {
             let Step { input, plan, .. } = &mut self.step;
             self.samples.take_lost(input, plan);
+            self.tell_planners();
+        }
+    }
+
+    /// Passes the sample taken last on to all programs, also to those that do not act: they may have
+    /// to, any time.
+    fn tell_planners(&mut self) {
+        for planner in &mut self.planners {
+            match self.samples.newest() {
+                Some(sample) => planner.observe(sample),
+                None => planner.forget_samples(),
+            }
         }
     }
 
@@ -261,7 +279,7 @@ impl DeepcController {
 
     /// Clips the input to the bounds of its change from the one applied last, then to its own.
     fn clip_input(&mut self) {
-        let settings = self.planners[self.active].program().settings();
+        let settings = self.planners[self.active].program().stage();
         if let Some(last) = self.samples.input() {
             let changes = settings.options.input_change_bounds.iter().zip(last);
             for (value, (change, last)) in self.step.input.iter_mut().zip(changes) {
@@ -350,7 +368,7 @@ impl DeepcController {
         let plan = program.plan();
         self.step.residual = plan.residual;
         self.step.tracking = Some(plan.tracking);
-        self.step.plan.adopt(plan, &program.settings().input_bounds);
+        self.step.plan.adopt(plan, &program.stage().input_bounds);
         self.fallback.rearm();
         self.take_planned(0);
     }
@@ -373,10 +391,7 @@ impl DeepcController {
         let input = step.input.iter_mut();
         input.zip(planned).for_each(|(u, planned)| *u = *planned);
         let outputs = step.predicted_outputs();
-        let bounds = &self.planners[self.active]
-            .program()
-            .settings()
-            .output_bounds;
+        let bounds = &self.planners[self.active].program().stage().output_bounds;
         let violations = bounds
             .iter()
             .zip(outputs.col_iter())
@@ -398,7 +413,7 @@ fn within_reach(change: &Bounds, last: f64) -> Bounds {
     }
 }
 
-impl Controller for DeepcController {
+impl Controller for RecedingHorizonController {
     fn inputs(&self) -> usize {
         self.shape().inputs
     }
@@ -436,6 +451,7 @@ impl Controller for DeepcController {
         let Step { input, plan, .. } = &mut self.step;
         let decided = std::mem::take(&mut self.awaits_sample).then_some(&input[..]);
         self.samples.take(sample, decided, plan);
+        self.tell_planners();
     }
 
     fn reset(&mut self) {
