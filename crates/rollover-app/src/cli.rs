@@ -22,6 +22,8 @@ pub enum Command {
     Run(RunArgs),
     /// Records the data a controller works from, by the paper's recipe.
     Record(RecordArgs),
+    /// Identifies a linear model from recordings: model file, report, figures.
+    Identify(IdentifyArgs),
 }
 
 /// Arguments of `paper`.
@@ -84,6 +86,54 @@ pub struct RecordArgs {
     #[arg(long, value_name = "VEHICLE")]
     pub vehicle: Option<String>,
     /// Print the recording's summary as JSON on standard output.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `identify`.
+#[derive(Debug, Args)]
+pub struct IdentifyArgs {
+    /// CSV files with a header line, one uninterrupted record each.
+    #[arg(required = true, value_name = "RECORDING")]
+    pub recordings: Vec<PathBuf>,
+    /// Columns that are inputs; by default those that `record` writes.
+    #[arg(long, value_delimiter = ',', value_name = "COLUMN,…")]
+    pub inputs: Vec<String>,
+    /// Columns that are outputs; by default those that `record` writes.
+    #[arg(long, value_delimiter = ',', value_name = "COLUMN,…")]
+    pub outputs: Vec<String>,
+    /// Columns of measured disturbances: they act on the plant, but no controller decides them.
+    #[arg(long, value_delimiter = ',', value_name = "COLUMN,…")]
+    pub disturbances: Vec<String>,
+    /// Column of time stamps in seconds; by default `time_s`, if there is one.
+    #[arg(long, value_name = "COLUMN")]
+    pub time: Option<String>,
+    /// Sample time; by default the interval between the first two time stamps.
+    #[arg(long, value_name = "S")]
+    pub sample_time: Option<f64>,
+    /// The outputs of a row were measured when its inputs began to act, not at the end of their
+    /// interval.
+    #[arg(long)]
+    pub outputs_at_start: bool,
+    /// Model order; by default the best on held-out samples.
+    #[arg(long, value_name = "N")]
+    pub order: Option<usize>,
+    /// Largest order tried where it is not given.
+    #[arg(long, value_name = "N", default_value_t = 10, conflicts_with = "order")]
+    pub max_order: usize,
+    /// Inputs whose effect is held at zero, because the data do not identify it.
+    #[arg(long, value_delimiter = ',', value_name = "COLUMN,…")]
+    pub without_effect: Vec<String>,
+    /// Recordings that judge the model; by default it is judged on those it was made from.
+    #[arg(long, value_delimiter = ',', value_name = "RECORDING,…")]
+    pub validate: Vec<PathBuf>,
+    /// Steps ahead of the farthest prediction that is judged.
+    #[arg(long, default_value_t = 20, value_name = "N")]
+    pub steps: usize,
+    /// Folder for the results.
+    #[arg(long, default_value = "out/identify", value_name = "DIR")]
+    pub out: PathBuf,
+    /// Print the report as JSON on standard output.
     #[arg(long)]
     pub json: bool,
 }

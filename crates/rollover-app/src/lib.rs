@@ -12,6 +12,7 @@
 pub mod campaign;
 pub mod cli;
 pub mod closed_loop;
+pub mod identify;
 pub mod interrupt;
 pub mod output;
 pub mod record;
@@ -33,5 +34,6 @@ pub fn execute(command: &cli::Command, interrupt: &Interrupt) -> Result<()> {
         cli::Command::Paper(args) => campaign::paper(args, interrupt),
         cli::Command::Run(args) => campaign::single(args, interrupt),
         cli::Command::Record(args) => campaign::record_only(args, interrupt),
+        cli::Command::Identify(args) => identify::identify(args, interrupt),
     }
 }

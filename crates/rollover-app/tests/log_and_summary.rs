@@ -78,6 +78,7 @@ fn a_summary_counts_what_the_log_holds() {
         seed: 7,
         recording: None,
         speed_reference_kmh: 105.0,
+        model: None,
     };
     let weights = InputWeights {
         steering_wheel_per_deg2: 2.0,
@@ -118,6 +119,7 @@ fn summary_json_has_the_fields_programs_rely_on() {
         seed: 1,
         recording: None,
         speed_reference_kmh: 105.0,
+        model: None,
     };
     let summary = Summary::of_log(identity, Outcome::RolledOver, &rows(3), None, 0.01);
     let json = serde_json::to_value(&summary).expect("a summary is JSON");

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use rollover_app::closed_loop::{Finished, Run, controller, run};
+use rollover_app::closed_loop::{Finished, Recorded, Run, Watch, controller, run};
 use rollover_app::interrupt::Interrupt;
 use rollover_app::record::record;
 use rollover_app::run_log::LogRow;
@@ -29,7 +29,12 @@ fn drive(name: &str, seed: u64, speed_reference_kmh: f64) -> Finished {
     let controller = settings.map(|settings| {
         let (data, _) = record(&scenario, &vehicle, seed, &Interrupt::default())
             .expect("the recording is survived");
-        controller(&scenario, settings, &data).expect("the recording excites the plant")
+        let watch = Watch {
+            interrupt: &Interrupt::default(),
+            progress: &|_| (),
+        };
+        let built = controller(&scenario, settings, &Recorded::new(&data), watch);
+        built.expect("the recording excites the plant").controller
     });
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
     let log: &Path = &folder.path().join("log.csv");

@@ -5,19 +5,23 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context, Result, anyhow};
-use deepc_core::data::Dataset;
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
+use sysid::{Identification, Progress};
 use vehicle_dyn::metrics::Outcome;
 use vehicle_dyn::parameters::VehicleParameters;
 use vehicle_dyn::road::Course;
 
-use crate::closed_loop::{self, Run};
+use crate::closed_loop::{self, Built, Recorded, Run, Watch};
 use crate::interrupt::Interrupt;
 use crate::output::{create_folder, write_json, write_whole};
 use crate::report::{self, Figure, PageRun, Polyline, RunTrace};
 use crate::run_log::LogRow;
 use crate::scenario::Scenario;
-use crate::summary::{RunIdentity, Summary};
+use crate::summary::{ModelSummary, RunIdentity, Summary};
+
+const MODEL: &str = "model.json";
+const IDENTIFICATION_TEXT: &str = "identification.txt";
+const IDENTIFICATION_JSON: &str = "identification.json";
 
 /// One run to be made.
 pub(super) struct Job<'a> {
@@ -26,7 +30,7 @@ pub(super) struct Job<'a> {
     pub(super) controller: &'a str,
     pub(super) seed: u64,
     pub(super) speed_reference_kmh: f64,
-    pub(super) data: Option<&'a Dataset>,
+    pub(super) recorded: Option<&'a Recorded<'a>>,
     pub(super) recording: Option<&'a Path>,
     pub(super) out: PathBuf,
 }
@@ -42,15 +46,36 @@ impl Job<'_> {
     /// Runs, then writes summary and figures beside the log.
     pub(super) fn run(&self, interrupt: &Interrupt, bar: &ProgressBar) -> Result<RunResult> {
         let settings = self.scenario.controller(self.controller)?;
-        let controller = match (settings, self.data) {
-            (Some(settings), Some(data)) => {
-                Some(closed_loop::controller(self.scenario, settings, data)?)
+        let built = match (settings, self.recorded) {
+            (Some(settings), Some(recorded)) => {
+                let progress = |progress: &Progress| {
+                    let (done, total) = (progress.done + 1, progress.total);
+                    bar.set_message(format!("{} ({done} of {total})", progress.stage));
+                };
+                let watch = Watch {
+                    interrupt,
+                    progress: &progress,
+                };
+                Some(closed_loop::controller(
+                    self.scenario,
+                    settings,
+                    recorded,
+                    watch,
+                )?)
             }
             _ => None,
         };
+        let (controller, identification) = built.map_or((None, None), |built: Built| {
+            (Some(built.controller), built.identification)
+        });
+        bar.set_message("");
+        bar.reset_elapsed();
         interrupt.check("before the first step", "nothing was written")?;
         create_folder(&self.out)?;
         remove_old_results(&self.out)?;
+        if let Some(identification) = &identification {
+            write_identification(&self.out, identification)?;
+        }
         let run = Run {
             scenario: self.scenario,
             vehicle: self.vehicle,
@@ -67,6 +92,7 @@ impl Job<'_> {
                 seed: self.seed,
                 recording: self.recording.map(|file| file.display().to_string()),
                 speed_reference_kmh: self.speed_reference_kmh,
+                model: identification.map(|i| ModelSummary::of_report(&i.report)),
             },
             finished.outcome,
             &finished.rows,
@@ -85,10 +111,24 @@ impl Job<'_> {
     }
 }
 
+/// Writes the model and all that was found beside it.
+fn write_identification(folder: &Path, found: &Identification) -> Result<()> {
+    write_whole(&folder.join(MODEL), &found.model.to_json()?)?;
+    write_whole(&folder.join(IDENTIFICATION_TEXT), &found.report.to_string())?;
+    write_json(&folder.join(IDENTIFICATION_JSON), &found.report)
+}
+
 /// Removes what an earlier run or campaign derived from its logs: beside fresh logs it would lie if
 /// this one is interrupted.
 pub(super) fn remove_old_results(folder: &Path) -> Result<()> {
-    let names = ["summary.json", "index.html"].map(str::to_owned);
+    let names = [
+        "summary.json",
+        "index.html",
+        MODEL,
+        IDENTIFICATION_TEXT,
+        IDENTIFICATION_JSON,
+    ]
+    .map(str::to_owned);
     let figures = report::FIGURE_NAMES.map(|name| format!("{name}.svg"));
     for name in names.iter().chain(&figures) {
         let old = folder.join(name);
@@ -164,8 +204,9 @@ pub(super) fn cores() -> usize {
 }
 
 pub(super) fn step_bar(scenario: &Scenario, name: &str) -> ProgressBar {
-    let style = ProgressStyle::with_template("{prefix:18} {bar:32} {percent:>3} %  {eta} left")
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    let style =
+        ProgressStyle::with_template("{prefix:20} {bar:32} {percent:>3} %  {eta} left  {msg}")
+            .unwrap_or_else(|_| ProgressStyle::default_bar());
     ProgressBar::new(scenario.steps() as u64)
         .with_style(style)
         .with_prefix(name.to_owned())

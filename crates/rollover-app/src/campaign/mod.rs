@@ -9,6 +9,7 @@ use deepc_core::data::Dataset;
 use vehicle_dyn::parameters::VehicleParameters;
 
 use crate::cli::{PaperArgs, RecordArgs, RunArgs};
+use crate::closed_loop::Recorded;
 use crate::interrupt::Interrupt;
 use crate::output::{create_folder, print_json, print_line, write_json};
 use crate::record::{self, record};
@@ -21,7 +22,14 @@ use job::{
 
 /// The main job's scenario and controllers.
 const PAPER_SCENARIO: &str = "sedan-s1";
-const PAPER_CONTROLLERS: [&str; 4] = [DRIVER, "rd-deepc-1", "rd-deepc-2", "rd-deepc-1-paper"];
+const PAPER_CONTROLLERS: [&str; 6] = [
+    DRIVER,
+    "rd-deepc-1",
+    "rd-deepc-2",
+    "rd-deepc-1-paper",
+    "lmpc",
+    "lmpc-no-speed-effect",
+];
 
 /// `paper`: every controller of the main job, a table and a page.
 ///
@@ -33,13 +41,14 @@ pub fn paper(args: &PaperArgs, interrupt: &Interrupt) -> Result<()> {
     create_folder(&args.out)?;
     remove_old_results(&args.out)?;
     let dataset = recording(&scenario, &vehicle, args.seed, &args.out, interrupt)?;
+    let recorded = Recorded::new(&dataset);
     let job = |controller: &'static str| Job {
         scenario: &scenario,
         vehicle: &vehicle,
         controller,
         seed: args.seed,
         speed_reference_kmh: scenario.speed_reference_kmh,
-        data: (controller != DRIVER).then_some(&dataset),
+        recorded: (controller != DRIVER).then_some(&recorded),
         recording: None,
         out: args.out.join(controller),
     };
@@ -69,6 +78,7 @@ pub fn paper(args: &PaperArgs, interrupt: &Interrupt) -> Result<()> {
         print_json(&summaries)
     } else {
         print_line(&report::summary_table(&summaries))?;
+        print_models(&summaries)?;
         print_line(&format!("figures: {}", index.display()))
     }
 }
@@ -101,14 +111,15 @@ pub fn single(args: &RunArgs, interrupt: &Interrupt) -> Result<()> {
         (Some(_), Some(file)) => Some(record::read(file, &scenario)?),
         (Some(_), None) => Some(recording(&scenario, &vehicle, args.seed, &out, interrupt)?),
     };
+    let recorded = data.as_ref().map(Recorded::new);
     let job = Job {
         scenario: &scenario,
         vehicle: &vehicle,
         controller: &args.controller,
         seed: args.seed,
         speed_reference_kmh,
-        data: data.as_ref(),
-        recording: args.recording.as_deref().filter(|_| data.is_some()),
+        recorded: recorded.as_ref(),
+        recording: args.recording.as_deref().filter(|_| recorded.is_some()),
         out,
     };
     let bar = step_bar(&scenario, &args.controller);
@@ -120,6 +131,7 @@ pub fn single(args: &RunArgs, interrupt: &Interrupt) -> Result<()> {
         print_line(&report::summary_table(std::slice::from_ref(
             &result.summary,
         )))?;
+        print_models(std::slice::from_ref(&result.summary))?;
         print_line(&format!("results: {}", job.out.display()))
     }
 }
@@ -151,6 +163,17 @@ pub fn record_only(args: &RecordArgs, interrupt: &Interrupt) -> Result<()> {
             summary.path_deviation_max_m
         ))
     }
+}
+
+/// A line for every run that predicts with an identified model.
+fn print_models(summaries: &[Summary]) -> Result<()> {
+    let models = summaries
+        .iter()
+        .filter_map(|s| Some((&s.controller, s.model.as_ref()?)));
+    for (controller, model) in models {
+        print_line(&format!("{controller}: {model}"))?;
+    }
+    Ok(())
 }
 
 /// The runs, or one error that tells of all that were not made.

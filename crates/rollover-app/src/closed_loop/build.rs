@@ -1,24 +1,62 @@
 //! From a recording and settings to a controller: the offline line of the data flow.
 
+use std::sync::Arc;
+
 use anyhow::{Context, Result, bail};
 use deepc_core::controller::{Controller, DeepcController, RecedingHorizonSettings};
 use deepc_core::data::Dataset;
 use deepc_core::hankel::{HankelMatrix, Horizons};
 use deepc_core::predictor::Predictor;
 use deepc_core::program::{
-    Bounds, CondensedProgram, DeepcSettings, OutputBounds, PredictiveProgram, ProgramOptions, Slack,
+    Bounds, DeepcSettings, OutputBounds, ProgramOptions, Slack, StageSettings,
 };
-use deepc_core::solver::{ActiveSet, ActiveSetSettings, SolveBudget};
+use deepc_core::solver::SolveBudget;
+use sysid::lmpc::{self, LmpcSettings};
+use sysid::{Identification, StateSpace};
 
-use crate::scenario::{ControllerSettings, InputBounds, Method, Scenario};
+use super::recorded::{Recorded, Watch};
+use crate::scenario::{
+    ControllerSettings, DataMatrix, DataSettings, InputBounds, ModelSettings, Prediction, Scenario,
+};
 
-/// Builds the controller of `settings` from the recording `data`.
+/// A controller, and what it was made from beside the recording.
+pub struct Built {
+    /// The controller.
+    pub controller: Box<dyn Controller>,
+    /// The identification of its model, if it has one.
+    pub identification: Option<Arc<Identification>>,
+}
+
+/// Builds the controller of `settings` from a recording.
 ///
 /// # Errors
 /// When the recording is too short or does not excite the plant; the message says what to record.
+/// As [`Interrupted`](crate::interrupt::Interrupted) when the user stops an identification.
 pub fn controller(
     scenario: &Scenario,
     settings: &ControllerSettings,
+    recorded: &Recorded<'_>,
+    watch: Watch<'_>,
+) -> Result<Built> {
+    Ok(match &settings.prediction {
+        Prediction::Data(data) => Built {
+            controller: deepc(scenario, settings, data, recorded.data())?,
+            identification: None,
+        },
+        Prediction::Model(model) => {
+            let identification = recorded.identification(&model.identification, watch)?;
+            Built {
+                controller: linear_mpc(scenario, settings, model, &identification.model)?,
+                identification: Some(identification),
+            }
+        }
+    })
+}
+
+fn deepc(
+    scenario: &Scenario,
+    settings: &ControllerSettings,
+    by_data: &DataSettings,
     data: &Dataset,
 ) -> Result<Box<dyn Controller>> {
     let horizons = Horizons {
@@ -27,7 +65,7 @@ pub fn controller(
     };
     let hankel = HankelMatrix::build(data, horizons).context("the recording cannot be used")?;
     let exciting = hankel
-        .require_persistently_exciting(settings.order_bound)
+        .require_persistently_exciting(by_data.order_bound)
         .context("the recording cannot be used")?;
     if let Some((name, value)) = exciting.report().and_then(|r| r.constant_outputs.first()) {
         bail!(
@@ -35,39 +73,69 @@ pub fn controller(
              be learnt about it; check its sensor and record again"
         );
     }
-    let predictor = match settings.method {
-        Method::Deepc => Predictor::full(&exciting),
-        Method::RdDeepc => Predictor::exact(&exciting)?,
+    let predictor = match by_data.matrix {
+        DataMatrix::Whole => Predictor::full(&exciting),
+        DataMatrix::Reduced => Predictor::exact(&exciting)?,
     };
-    let program = CondensedProgram::new(&predictor, &deepc_settings(&scenario.bounds, settings))?;
-    let solver = ActiveSet::new(program.qp(), ActiveSetSettings::default())?;
-    let receding = RecedingHorizonSettings {
+    let stage = stage(&scenario.bounds, settings);
+    let program = DeepcSettings {
+        input_bounds: stage.input_bounds,
+        output_bounds: stage.output_bounds,
+        options: stage.options,
+        input_slack: Slack::Penalty(by_data.lambda_u),
+        output_slack: Slack::Penalty(by_data.lambda_y),
+        ..DeepcSettings::new(
+            &stage.input_weights,
+            &stage.output_weights,
+            by_data.regularisation,
+            Slack::Hard,
+        )
+    };
+    let controller = DeepcController::condensed(&predictor, &program, receding(settings))?;
+    Ok(Box::new(controller))
+}
+
+fn linear_mpc(
+    scenario: &Scenario,
+    settings: &ControllerSettings,
+    by_model: &ModelSettings,
+    model: &StateSpace,
+) -> Result<Box<dyn Controller>> {
+    let program = LmpcSettings {
+        offset_handling: by_model.offset_handling,
+        past_steps: Some(settings.past_steps),
+        ..stage(&scenario.bounds, settings).into()
+    };
+    let horizon = settings.horizon_steps;
+    let controller = lmpc::controller(model, &program, horizon, receding(settings))
+        .context(
+            "the model that the recording gives cannot be used for control (with \
+             `identification.order` it is another one; `offset_handling = \"none\"` asks less of it)",
+        )?;
+    Ok(Box::new(controller))
+}
+
+fn receding(settings: &ControllerSettings) -> RecedingHorizonSettings {
+    RecedingHorizonSettings {
         moves_per_solve: settings.moves_per_solve,
         // Simulated time waits for the solver. A limit in wall-clock time would let the load of
         // the machine decide the outcome.
         ..RecedingHorizonSettings::every_sample(SolveBudget::generous())
-    };
-    Ok(Box::new(DeepcController::new(
-        Box::new(program),
-        Box::new(solver),
-        receding,
-    )?))
+    }
 }
 
-/// The settings in the order of the recording's columns: steering wheel, target speed; LTR.
-fn deepc_settings(bounds: &InputBounds, settings: &ControllerSettings) -> DeepcSettings {
+/// What every method shares, in the order of the recording's columns: steering wheel, target speed;
+/// LTR.
+fn stage(bounds: &InputBounds, settings: &ControllerSettings) -> StageSettings {
     let between = |[lower, upper]: [f64; 2]| Bounds::between(lower, upper);
     let (limit, penalty) = (settings.ltr_limit, settings.ltr_penalty);
-    DeepcSettings {
+    StageSettings {
         input_weights: vec![
             settings.input_weights.steering_wheel_per_deg2,
             settings.input_weights.target_speed_per_kmh2,
         ],
         // The paper's Q = 0: LTR is bounded, not tracked.
         output_weights: vec![0.0],
-        regularisation: settings.regularisation,
-        input_slack: Slack::Penalty(settings.lambda_u),
-        output_slack: Slack::Penalty(settings.lambda_y),
         input_bounds: vec![
             between(bounds.steering_wheel_deg),
             between(bounds.target_speed_kmh),

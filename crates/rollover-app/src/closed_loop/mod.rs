@@ -2,6 +2,7 @@
 
 mod build;
 mod plant;
+mod recorded;
 
 use std::path::Path;
 use std::time::Instant;
@@ -11,8 +12,9 @@ use deepc_core::controller::{Controller, Origin, Plant, Reference};
 use vehicle_dyn::metrics::Outcome;
 use vehicle_dyn::parameters::VehicleParameters;
 
-pub use build::controller;
+pub use build::{Built, controller};
 pub use plant::{DrivenVehicle, INPUTS, OUTPUTS};
+pub use recorded::{Recorded, Watch};
 
 use crate::interrupt::{Interrupt, Interrupted};
 use crate::run_log::{LogRow, LogWriter, SolveStatus};

@@ -58,6 +58,7 @@ struct RunView<'a> {
     name: &'a str,
     outcome: String,
     description: &'a str,
+    model: Option<String>,
     folder: &'a str,
     figures: &'a [Figure],
 }
@@ -78,6 +79,7 @@ pub fn write_index(path: &Path, page: &Page<'_>) -> Result<()> {
         name: &run.summary.controller,
         outcome: run.summary.outcome.to_string(),
         description: &run.description,
+        model: run.summary.model.as_ref().map(ToString::to_string),
         folder: &run.folder,
         figures: &run.figures,
     });

@@ -2,23 +2,23 @@
 
 use deepc_core::program::Regularisation;
 use serde::Deserialize;
+use sysid::IdentificationSettings;
+use sysid::lmpc::OffsetHandling;
 
+use super::controller_file::ControllerEntry;
 use crate::summary::InputWeights;
 
-/// Settings of one controller.
+/// Settings of one controller: what every method shares, and how the future is predicted.
 #[derive(Debug, Clone, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(try_from = "ControllerEntry")]
 pub struct ControllerSettings {
     /// What is special about it, in a sentence.
     pub description: String,
-    /// How it predicts.
-    pub method: Method,
-    /// Length of the past window `T_ini`, steps.
+    /// Length of the past window `T_ini`, steps. With a model it is the window that its state is
+    /// started from.
     pub past_steps: usize,
     /// Prediction horizon N, steps.
     pub horizon_steps: usize,
-    /// Upper bound on the plant's order n, for the excitation check of order L + n.
-    pub order_bound: usize,
     /// Moves applied from each solve, steps.
     pub moves_per_solve: usize,
     /// Bound on |LTR| over the horizon.
@@ -27,6 +27,26 @@ pub struct ControllerSettings {
     pub ltr_penalty: LtrPenalty,
     /// Weights R on the inputs' distance from their references.
     pub input_weights: InputWeights,
+    /// How it predicts.
+    pub prediction: Prediction,
+}
+
+/// How a controller predicts, by the scenario file's `method`.
+#[derive(Debug, Clone)]
+pub enum Prediction {
+    /// `deepc`, `rd-deepc`: by the recording itself.
+    Data(DataSettings),
+    /// `lmpc`: by a model identified from the recording.
+    Model(ModelSettings),
+}
+
+/// Settings of `DeePC`.
+#[derive(Debug, Clone)]
+pub struct DataSettings {
+    /// Which matrix it predicts with.
+    pub matrix: DataMatrix,
+    /// Upper bound on the plant's order n, for the excitation check of order L + n.
+    pub order_bound: usize,
     /// Regularisation of g.
     pub regularisation: Regularisation,
     /// Weight `λ_u` on the slack of the past inputs, 1/deg² and 1/(km/h)².
@@ -35,14 +55,22 @@ pub struct ControllerSettings {
     pub lambda_y: f64,
 }
 
-/// How a controller predicts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Method {
-    /// `DeePC` on the whole Hankel matrix (paper eq. 16).
-    Deepc,
-    /// `DeePC` on the matrix reduced to its numerical rank (paper eq. 19).
-    RdDeepc,
+/// The matrix that `DeePC` predicts with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DataMatrix {
+    /// The whole Hankel matrix (paper eq. 16).
+    Whole,
+    /// The matrix reduced to its numerical rank (paper eq. 19).
+    Reduced,
+}
+
+/// Settings of the linear MPC on an identified model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModelSettings {
+    /// How the model is identified; what is left out is found from the recording.
+    pub identification: IdentificationSettings,
+    /// What becomes of a lasting difference between the vehicle and the model.
+    pub offset_handling: OffsetHandling,
 }
 
 /// Price of exceeding the bound on |LTR| by s: linear·s + ½·quadratic·s² in every step.

@@ -2,10 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
+use sysid::SysidError;
+use sysid::lmpc::OffsetHandling;
 use thiserror::Error;
 use vehicle_dyn::road::Course;
 
-use super::{ControllerSettings, Scenario};
+use super::{ControllerSettings, ModelSettings, Prediction, Scenario};
+use crate::record::INPUT_COLUMNS;
 
 /// Scenarios that travel with the binary.
 const EMBEDDED: [(&str, &str); 1] = [(
@@ -232,14 +235,11 @@ impl Check<'_> {
         let counts = [
             ("past_steps", c.past_steps),
             ("horizon_steps", c.horizon_steps),
-            ("order_bound", c.order_bound),
             ("moves_per_solve", c.moves_per_solve),
         ];
-        for (key, count) in counts {
-            if count == 0 || count > 10_000 {
-                return Err(self.out_of_range(&field(key), count.to_string(), "in [1, 10000]"));
-            }
-        }
+        counts
+            .iter()
+            .try_for_each(|&(key, count)| self.count(&field(key), count))?;
         if c.moves_per_solve > c.horizon_steps {
             return Err(self.out_of_range(
                 &field("moves_per_solve"),
@@ -262,14 +262,50 @@ impl Check<'_> {
         weights
             .iter()
             .try_for_each(|&(key, w)| self.within(&field(key), w, 0.0, 1e15))?;
-        let positive = [
-            ("regularisation.lambda_g", c.regularisation.lambda_g),
-            ("lambda_u", c.lambda_u),
-            ("lambda_y", c.lambda_y),
-        ];
-        positive
-            .iter()
-            .try_for_each(|&(key, w)| self.within(&field(key), w, 1e-12, 1e15))
+        match &c.prediction {
+            Prediction::Data(data) => {
+                self.count(&field("order_bound"), data.order_bound)?;
+                let positive = [
+                    ("regularisation.lambda_g", data.regularisation.lambda_g),
+                    ("lambda_u", data.lambda_u),
+                    ("lambda_y", data.lambda_y),
+                ];
+                positive
+                    .iter()
+                    .try_for_each(|&(key, w)| self.within(&field(key), w, 1e-12, 1e15))
+            }
+            Prediction::Model(model) => self.model(&field, model),
+        }
+    }
+
+    fn model(
+        &self,
+        field: &impl Fn(&str) -> String,
+        model: &ModelSettings,
+    ) -> Result<(), ScenarioError> {
+        if let OffsetHandling::OutputDisturbance { drift } = model.offset_handling {
+            let key = "offset_handling.output_disturbance.drift";
+            self.within(&field(key), drift, 1e-6, 1.0)?;
+        }
+        let inputs = INPUT_COLUMNS.map(str::to_owned);
+        model.identification.check(&inputs).map_err(|error| {
+            let identification = field("identification");
+            match error {
+                SysidError::Setting {
+                    field,
+                    found,
+                    allowed,
+                } => self.out_of_range(&format!("{identification}.{field}"), found, &allowed),
+                other => self.out_of_range(&identification, other.to_string(), "as it says"),
+            }
+        })
+    }
+
+    fn count(&self, field: &str, count: usize) -> Result<(), ScenarioError> {
+        if (1..=10_000).contains(&count) {
+            return Ok(());
+        }
+        Err(self.out_of_range(field, count.to_string(), "in [1, 10000]"))
     }
 
     fn course<E: std::fmt::Display>(

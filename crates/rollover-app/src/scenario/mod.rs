@@ -1,5 +1,6 @@
 //! Scenarios as data: what is driven where, by whom, and what the controllers may do.
 
+mod controller_file;
 mod controllers;
 mod load;
 
@@ -7,7 +8,9 @@ use serde::Deserialize;
 use vehicle_dyn::driver::DriverParameters;
 use vehicle_dyn::road::CourseDescription;
 
-pub use controllers::{ControllerSettings, LtrPenalty, Method};
+pub use controllers::{
+    ControllerSettings, DataMatrix, DataSettings, LtrPenalty, ModelSettings, Prediction,
+};
 pub use load::{ScenarioError, embedded_names, load};
 
 /// Name of the controller that every scenario has: the driver alone.

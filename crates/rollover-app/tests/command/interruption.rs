@@ -105,3 +105,58 @@ fn a_campaign_that_is_stopped_leaves_no_page_and_no_empty_log() {
     let after = std::fs::read(out.join("rd-deepc-1-paper/log.csv")).expect("the last run's log");
     assert_eq!(before, after, "a run that did not begin keeps what it had");
 }
+
+/// Waits until a process handles Ctrl-C itself; before that the signal would just kill it.
+fn wait_for_handler(process: u32) {
+    let started = Instant::now();
+    let handles = || {
+        let status = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
+        let mask = status.lines().find_map(|l| l.strip_prefix("SigCgt:"))?;
+        // SIGINT is 2, the second lowest bit.
+        Some(u64::from_str_radix(mask.trim(), 16).ok()? & 2 != 0)
+    };
+    while handles() == Some(false) {
+        assert!(started.elapsed() < PATIENCE, "the command does not begin");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    if handles().is_none() {
+        // No such file on this system.
+        std::thread::sleep(Duration::from_secs(1));
+    }
+}
+
+#[test]
+fn an_identification_that_is_stopped_leaves_what_was_there() {
+    let folder = folder();
+    let file = |name: &str| folder.path().join("out").join(name);
+    write(
+        &folder.path().join("tanks.csv"),
+        &super::identify::tanks(300, 1),
+    );
+    super::succeed(folder.path(), &super::identify::with(&["--out", "out"]));
+    let before = ["model.json", "report.json", "index.html"].map(|name| super::read(&file(name)));
+    // Long enough to be under way on any machine.
+    write(
+        &folder.path().join("tanks.csv"),
+        &super::identify::tanks(50_000, 2),
+    );
+    let running = command(folder.path(), &super::identify::with(&["--out", "out"]))
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the command starts");
+    wait_for_handler(running.id());
+    interrupt(running.id());
+    let output = running.wait_with_output().expect("the command ends");
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(130), "{message}");
+    assert_says(&message, &["interrupted", "nothing was written"]);
+    let after = ["model.json", "report.json", "index.html"].map(|name| super::read(&file(name)));
+    assert_eq!(before, after, "one run's results, whole");
+    let entries = std::fs::read_dir(folder.path().join("out")).expect("the folder is there");
+    for entry in entries {
+        let name = entry.expect("an entry").file_name();
+        let name = name.to_string_lossy();
+        assert!(!name.ends_with(".partial"), "{name} is half a file");
+    }
+}

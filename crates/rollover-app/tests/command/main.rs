@@ -1,7 +1,10 @@
 //! The `rollover-app` command as a user meets it.
 
 mod bad_input;
+mod identify;
+mod identify_bad_input;
 mod interruption;
+mod linear_mpc;
 mod reproducible;
 
 use std::path::Path;

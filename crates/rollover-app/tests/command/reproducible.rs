@@ -5,7 +5,7 @@ use std::path::Path;
 use super::{command, folder, read, succeed};
 
 /// The log without its last column, the measured time of each step.
-fn log_without_times(path: &Path) -> String {
+pub(super) fn log_without_times(path: &Path) -> String {
     let text = read(path);
     let header = text.lines().next().expect("a log has a header");
     assert!(

@@ -1,9 +1,12 @@
 //! What a run comes to: the numbers of `summary.json`, computed from its log alone.
 
+mod model;
+
 use serde::{Deserialize, Serialize};
 use vehicle_dyn::metrics::Outcome;
 
 use crate::run_log::{LogRow, SolveStatus};
+pub use model::{EffectSummary, ModelSummary};
 
 /// The summary of one run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -32,10 +35,18 @@ pub struct Summary {
     pub speed_min_kmh: f64,
     /// Mean speed, km/h.
     pub speed_mean_kmh: f64,
+    /// Highest speed, km/h.
+    pub speed_max_kmh: f64,
+    /// Lowest target speed commanded, km/h.
+    pub target_speed_min_kmh: f64,
+    /// Highest target speed commanded, km/h.
+    pub target_speed_max_kmh: f64,
     /// Largest distance from the centre line, m.
     pub path_deviation_max_m: f64,
     /// Largest change of the driver's steering-wheel angle, deg.
     pub steering_correction_max_deg: f64,
+    /// Mean magnitude of that change, deg.
+    pub steering_correction_mean_deg: f64,
     /// Stage costs of the inputs summed over the run (paper, Table I; deg² and km²/h²).
     pub cost: f64,
     /// Control steps taken.
@@ -48,6 +59,8 @@ pub struct Summary {
     pub fallback_steps: usize,
     /// Wall-clock time of a step, µs.
     pub step_time_us: StepTime,
+    /// The identified model it predicts with, if it does.
+    pub model: Option<ModelSummary>,
 }
 
 /// Distribution of the wall-clock time of a step, µs.
@@ -76,6 +89,8 @@ pub struct RunIdentity {
     pub recording: Option<String>,
     /// Speed at the start and reference afterwards, km/h.
     pub speed_reference_kmh: f64,
+    /// The identified model of the controller, if it has one.
+    pub model: Option<ModelSummary>,
 }
 
 /// Stage-cost weights on the inputs' distance from their references.
@@ -114,6 +129,9 @@ impl Summary {
         sample_time_s: f64,
     ) -> Self {
         let max_of = |f: fn(&LogRow) -> f64| rows.iter().map(f).fold(0.0, f64::max);
+        let min_of = |f: fn(&LogRow) -> f64| rows.iter().map(f).fold(f64::INFINITY, f64::min);
+        let mean_of = |f: fn(&LogRow) -> f64| rows.iter().map(f).sum::<f64>() / rows.len() as f64;
+        let correction = |r: &LogRow| (r.steering_wheel_deg - r.steering_wheel_reference_deg).abs();
         let count = |f: fn(SolveStatus) -> bool| rows.iter().filter(|r| f(r.solve_status)).count();
         let violating = rows.iter().filter(|r| r.ltr.abs() > LTR_LIFT_OFF).count();
         Self {
@@ -127,21 +145,21 @@ impl Summary {
             end_time_s: rows.last().map_or(0.0, |r| r.time_s),
             ltr_abs_max: max_of(|r| r.ltr.abs()),
             ltr_violation_s: violating as f64 * sample_time_s,
-            speed_min_kmh: rows
-                .iter()
-                .map(|r| r.speed_kmh)
-                .fold(f64::INFINITY, f64::min),
-            speed_mean_kmh: rows.iter().map(|r| r.speed_kmh).sum::<f64>() / rows.len() as f64,
+            speed_min_kmh: min_of(|r| r.speed_kmh),
+            speed_mean_kmh: mean_of(|r| r.speed_kmh),
+            speed_max_kmh: max_of(|r| r.speed_kmh),
+            target_speed_min_kmh: min_of(|r| r.target_speed_kmh),
+            target_speed_max_kmh: max_of(|r| r.target_speed_kmh),
             path_deviation_max_m: max_of(|r| r.path_deviation_m.abs()),
-            steering_correction_max_deg: max_of(|r| {
-                (r.steering_wheel_deg - r.steering_wheel_reference_deg).abs()
-            }),
+            steering_correction_max_deg: max_of(correction),
+            steering_correction_mean_deg: mean_of(correction),
             cost: weights.map_or(0.0, |w| rows.iter().map(|r| w.stage_cost(r)).sum()),
             steps: rows.len(),
             unconstrained_steps: count(|s| s == SolveStatus::Unconstrained),
             solver_steps: count(|s| matches!(s, SolveStatus::Solved | SolveStatus::SolvedBySecond)),
             fallback_steps: count(SolveStatus::is_fallback),
             step_time_us: StepTime::of(rows.iter().map(|r| r.step_time_us)),
+            model: identity.model,
         }
     }
 }
