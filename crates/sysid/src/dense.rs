@@ -4,6 +4,7 @@ use deepc_core::faer::linalg::solvers::SolveLstsq;
 use deepc_core::faer::{Mat, MatRef};
 
 use crate::error::SysidError;
+use crate::least_squares::thin_svd;
 
 /// Below this ratio of pivots a least-squares problem is taken for one without full rank. A QR
 /// decomposition leaves rounding of about 1e-15 where a pivot should be 0.
@@ -31,38 +32,10 @@ pub(crate) fn least_squares(
 
 /// The pseudo-inverse of A.
 pub(crate) fn pseudo_inverse(a: MatRef<'_, f64>) -> Result<Mat<f64>, SysidError> {
-    let svd = thin_svd("a singular value decomposition", a)?;
+    let svd = thin_svd(a, "a singular value decomposition")?;
     let rank = svd.rank(SINGULAR_TOLERANCE);
-    let scaled = Mat::from_fn(a.ncols(), rank, |i, j| svd.v[(i, j)] / svd.sigma[j]);
+    let scaled = Mat::from_fn(a.ncols(), rank, |i, j| svd.v[(i, j)] / svd.values[j]);
     Ok(scaled * svd.u.subcols(0, rank).transpose())
-}
-
-/// A = U·diag(σ)·Vᵀ, k columns for k singular values in falling order.
-pub(crate) struct ThinSvd {
-    pub u: Mat<f64>,
-    pub sigma: Vec<f64>,
-    pub v: Mat<f64>,
-}
-
-impl ThinSvd {
-    /// Singular values above `tolerance` times the largest.
-    pub fn rank(&self, tolerance: f64) -> usize {
-        let limit = tolerance * self.sigma.first().copied().unwrap_or(0.0);
-        self.sigma.iter().filter(|&&s| s > limit).count()
-    }
-}
-
-/// `what` names the matrix in the message.
-pub(crate) fn thin_svd(what: &'static str, a: MatRef<'_, f64>) -> Result<ThinSvd, SysidError> {
-    let svd = a.thin_svd().map_err(|_| SysidError::Numerical {
-        what,
-        why: format!("no convergence for a {}×{} matrix", a.nrows(), a.ncols()),
-    })?;
-    Ok(ThinSvd {
-        u: svd.U().to_owned(),
-        sigma: svd.S().column_vector().iter().copied().collect(),
-        v: svd.V().to_owned(),
-    })
 }
 
 /// L of A = LQ with orthonormal rows of Q, n×n for A n×k, k ≥ n: the same Gram matrix and the same
@@ -78,25 +51,6 @@ pub(crate) fn compressed(a: MatRef<'_, f64>) -> Mat<f64> {
         a.nrows(),
         |i, j| if j <= i { r[(j, i)] } else { 0.0 },
     )
-}
-
-/// Largest magnitude of the eigenvalues of A; 0 for an empty one, NaN if A is not finite.
-pub(crate) fn spectral_radius(a: MatRef<'_, f64>) -> f64 {
-    if a.nrows() == 0 {
-        return 0.0;
-    }
-    if !is_finite(a) {
-        return f64::NAN;
-    }
-    a.eigenvalues().map_or(f64::NAN, |poles| {
-        poles.iter().map(|z| z.re.hypot(z.im)).fold(0.0, f64::max)
-    })
-}
-
-/// No NaN and no infinity in it.
-pub(crate) fn is_finite(a: MatRef<'_, f64>) -> bool {
-    a.col_iter()
-        .all(|column| column.iter().all(|value| value.is_finite()))
 }
 
 /// (A + Aᵀ)/2.

@@ -254,7 +254,7 @@ pub(crate) fn fit_initial_states(
 ) -> Result<Vec<Vec<f64>>, SysidError> {
     let inputs: Vec<usize> = (0..matrices.inputs()).collect();
     let packed = Packed::new(data, &inputs);
-    let predictor = &matrices.a - &matrices.k * &matrices.c;
+    let predictor = matrices.predictor();
     let longest = packed.longest();
     let (to_old, to_new) = observable_basis(predictor.as_ref(), matrices.c.as_ref(), longest)?;
     let (f, c) = (&to_new * predictor * &to_old, &matrices.c * &to_old);

@@ -85,24 +85,25 @@ pub(super) fn simulation_errors(
     data: &WorkingData,
     model: &SystemMatrices,
 ) -> Result<Vec<f64>, SysidError> {
-    let mut sums = vec![0.0; model.outputs()];
-    for errors in simulated(data, model)? {
+    Ok(mean_squares(&simulated(data, model)?))
+}
+
+/// Mean squares per output of errors T×p of every record.
+pub(super) fn mean_squares(records: &[Mat<f64>]) -> Vec<f64> {
+    let mut sums = vec![0.0; records.first().map_or(0, Mat::ncols)];
+    for errors in records {
         for (sum, errors) in sums.iter_mut().zip(errors.col_iter()) {
             *sum += errors.squared_norm_l2();
         }
     }
-    let samples = data.samples() as f64;
-    Ok(sums.into_iter().map(|sum| sum / samples).collect())
+    let samples = records.iter().map(Mat::nrows).sum::<usize>() as f64;
+    sums.into_iter().map(|sum| sum / samples).collect()
 }
 
 /// The same by parts of every record: one entry per part, each with one mean per output.
-pub(super) fn simulation_errors_by_part(
-    data: &WorkingData,
-    model: &SystemMatrices,
-    parts: usize,
-) -> Result<Vec<Vec<f64>>, SysidError> {
+pub(super) fn mean_squares_by_part(records: &[Mat<f64>], parts: usize) -> Vec<Vec<f64>> {
     let mut means = Vec::new();
-    for errors in simulated(data, model)? {
+    for errors in records {
         let samples = errors.nrows();
         for part in 0..parts {
             let (from, to) = (samples * part / parts, samples * (part + 1) / parts);
@@ -115,11 +116,14 @@ pub(super) fn simulation_errors_by_part(
             means.push(of_part.col_iter().map(mean).collect());
         }
     }
-    Ok(means)
+    means
 }
 
 /// Errors of the simulated output, T×p per record.
-fn simulated(data: &WorkingData, model: &SystemMatrices) -> Result<Vec<Mat<f64>>, SysidError> {
+pub(super) fn simulated(
+    data: &WorkingData,
+    model: &SystemMatrices,
+) -> Result<Vec<Mat<f64>>, SysidError> {
     let without_gain = SystemMatrices {
         k: Mat::zeros(model.order(), model.outputs()),
         ..model.clone()

@@ -27,8 +27,8 @@ pub use settings::{Feedthrough, FocusChoice, IdentificationSettings};
 
 use candidate::{Basis, Candidate, Care, Search, bases};
 use evaluate::{
-    ROUNDING, effective_samples, innovation_covariance, mean_log, simulation_errors,
-    simulation_errors_by_part,
+    ROUNDING, effective_samples, innovation_covariance, mean_log, mean_squares,
+    mean_squares_by_part, simulated,
 };
 use focus::{Focused, Way};
 use folds::Fold;
@@ -222,12 +222,9 @@ impl Search<'_> {
             let training = &fold.training;
             let estimates = self.subspace(training, &fold.bases, order)?;
             let candidate = self.refined(training, &estimates, Care::Rough)?;
-            let errors = simulation_errors(&fold.held_out, &candidate.model)?;
-            parts.extend(simulation_errors_by_part(
-                &fold.held_out,
-                &candidate.model,
-                PARTS,
-            )?);
+            let held_out = simulated(&fold.held_out, &candidate.model)?;
+            let errors = mean_squares(&held_out);
+            parts.extend(mean_squares_by_part(&held_out, PARTS));
             score += part * mean_log(&errors);
             let fits = fits(&fold.held_out, &errors);
             mean_fit

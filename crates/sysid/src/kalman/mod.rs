@@ -7,8 +7,9 @@ use deepc_core::faer::linalg::solvers::Solve;
 use deepc_core::faer::{Mat, MatRef, Side};
 use serde::{Deserialize, Serialize};
 
-use crate::dense::{is_finite, spectral_radius, symmetric_part};
+use crate::dense::symmetric_part;
 use crate::error::SysidError;
+use crate::stability::spectral_radius;
 
 /// Output noise below this variance is rounding, for outputs of size 1. (A file with ten digits
 /// has 1e-21.)
@@ -79,7 +80,7 @@ pub(crate) fn riccati(
         f = &f * &forward;
         g = symmetric_part((&g + &grown).as_ref());
         let larger = symmetric_part((&h + &step).as_ref());
-        if !(is_finite(larger.as_ref()) && is_finite(f.as_ref()) && is_finite(g.as_ref())) {
+        if !(larger.is_all_finite() && f.is_all_finite() && g.is_all_finite()) {
             break;
         }
         settled = step.norm_max() <= 1e-15 * larger.norm_max();
@@ -219,7 +220,7 @@ pub(crate) fn innovation_gain(
         radius: open,
         fallback: Some(fallback),
     };
-    let usable = is_finite(q) && is_finite(r) && is_finite(s);
+    let usable = q.is_all_finite() && r.is_all_finite() && s.is_all_finite();
     if usable && trace(r) > NOISE_FLOOR * p as f64 {
         let (smallest, largest) = joint_eigenvalues(q, r, s)?;
         if smallest >= -DEFINITE_TOLERANCE * largest

@@ -4,9 +4,10 @@ use deepc_core::faer::linalg::solvers::Solve;
 use deepc_core::faer::{Mat, MatRef, Scale, Side};
 
 use super::settings::OffsetHandling;
-use crate::dense::{spectral_radius, symmetric_part};
+use crate::dense::symmetric_part;
 use crate::error::SysidError;
 use crate::kalman::innovation_gain;
+use crate::stability::spectral_radius;
 use crate::state_space::{StateSpace, SystemMatrices};
 
 /// Innovation variances below this, for outputs of size 1, are those of a model whose noise is not
@@ -50,7 +51,7 @@ impl Design {
             .map(|channel| channel.scale)
             .collect();
         let scaled = rescaled(model.matrices(), &input_scales, &output_scales);
-        let closed = &scaled.a - &scaled.k * &scaled.c;
+        let closed = scaled.predictor();
         let radius = spectral_radius(closed.as_ref());
         if radius.is_nan() || radius >= 1.0 {
             return Err(SysidError::Unstable {

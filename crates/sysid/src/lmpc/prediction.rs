@@ -3,8 +3,8 @@
 use deepc_core::faer::Mat;
 use deepc_core::hankel::{Horizons, Shape, stacked_position};
 
-use crate::dense::spectral_radius;
 use crate::error::SysidError;
+use crate::stability::spectral_radius;
 use crate::state_space::StateSpace;
 
 /// Predictions may grow by this factor over the horizon: half the digits are left then.

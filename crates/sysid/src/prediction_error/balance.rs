@@ -48,7 +48,7 @@ impl Basis {
             what: "balancing the states",
             why: "a decomposition did not converge".into(),
         };
-        let f = &model.a - &model.k * &model.c;
+        let f = model.predictor();
         let c = &run.whitening * &model.c;
         let mut size = Mat::<f64>::zeros(n, n);
         let mut samples = 0.0;

@@ -174,7 +174,7 @@ impl<'a> Rows<'a> {
             run,
             layout,
             entries: layout.entries(),
-            f: &model.a - &model.k * &model.c,
+            f: model.predictor(),
             c: &run.whitening * &model.c,
         }
     }

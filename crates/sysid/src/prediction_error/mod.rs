@@ -263,5 +263,5 @@ pub(crate) fn prepared(
 
 /// Spectral radius of A − KC.
 fn predictor_radius(model: &SystemMatrices) -> f64 {
-    spectral_radius((&model.a - &model.k * &model.c).as_ref())
+    spectral_radius(model.predictor().as_ref())
 }

@@ -6,6 +6,7 @@
 use deepc_core::faer::linalg::solvers::Solve;
 use deepc_core::faer::{ColRef, Mat, Side};
 
+use super::predictor_radius;
 use crate::error::SysidError;
 use crate::input_fit::fit_initial_states;
 use crate::stability::spectral_radius;
@@ -54,10 +55,6 @@ pub(crate) fn refine_gain(
         }
     }
     Ok(best.0)
-}
-
-fn predictor_radius(model: &SystemMatrices) -> f64 {
-    spectral_radius((&model.a - &model.k * &model.c).as_ref())
 }
 
 fn descend(

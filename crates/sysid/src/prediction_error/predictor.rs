@@ -36,7 +36,7 @@ impl Evaluation {
         weighting: OutputWeights,
     ) -> Result<Self, SysidError> {
         let (n, p) = (model.order(), packed.outputs);
-        let f = &model.a - &model.k * &model.c;
+        let f = model.predictor();
         let response = FreeResponse::new(
             f.as_ref(),
             (whitening * &model.c).as_ref(),

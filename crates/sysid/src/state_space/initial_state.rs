@@ -3,7 +3,6 @@
 use deepc_core::faer::{Mat, MatRef};
 
 use super::StateSpace;
-use super::simulate::row_times;
 use crate::error::SysidError;
 
 /// What an initial state is for.
@@ -173,9 +172,6 @@ impl Triangle {
 impl super::SystemMatrices {
     /// A − K C, n×n.
     pub(crate) fn predictor(&self) -> Mat<f64> {
-        Mat::from_fn(self.order(), self.order(), |i, j| {
-            let column: Vec<f64> = self.c.col(j).iter().copied().collect();
-            self.a[(i, j)] - row_times(self.k.as_ref(), i, &column)
-        })
+        &self.a - &self.k * &self.c
     }
 }

@@ -17,11 +17,10 @@ pub use projection::Weighting;
 pub use settings::{InputMatrices, Offsets, OutputScaling, SubspaceSettings, UnstablePoles};
 pub(crate) use state_equations::{StateEquations, output_constant};
 
-use crate::dense::spectral_radius;
 use crate::error::SysidError;
 use crate::input_fit::{InputFit, InputStructure, fit_inputs};
 use crate::kalman::{GainFallback, innovation_gain};
-use crate::stability::stabilise;
+use crate::stability::{spectral_radius, stabilise};
 use crate::state_space::{StateSpace, SystemMatrices};
 use crate::working::WorkingData;
 

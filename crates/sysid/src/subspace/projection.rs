@@ -8,8 +8,9 @@ use deepc_core::hankel::leading_condition;
 use serde::{Deserialize, Serialize};
 
 use super::factor::Factor;
-use crate::dense::{compressed, least_squares, pseudo_inverse, thin_svd};
+use crate::dense::{compressed, least_squares, pseudo_inverse};
 use crate::error::SysidError;
+use crate::least_squares::thin_svd;
 
 /// Directions of the outputs below this fraction of the strongest are not whitened by the
 /// canonical variate weighting. Sensors and files do not resolve them, and on data without noise
@@ -87,9 +88,9 @@ impl Factor {
         let what = "the singular value decomposition of the projection";
         let (columns, singular_values, carried) = match weighting {
             Weighting::Moesp => {
-                let svd = thin_svd(what, compressed(along).as_ref())?;
+                let svd = thin_svd(compressed(along).as_ref(), what)?;
                 let carried = svd.rank(ORDER_TOLERANCE);
-                (svd.u, svd.sigma, carried)
+                (svd.u, svd.values, carried)
             }
             Weighting::N4sid => {
                 // Y_f /U_f W_p = L₃₂ L₂₂⁺ [L₂₁ L₂₂]; the last product is L₃₂ itself.
@@ -101,28 +102,28 @@ impl Factor {
                         Some(j) => along[(i, j)],
                     }
                 });
-                let svd = thin_svd(what, compressed(both.as_ref()).as_ref())?;
+                let svd = thin_svd(compressed(both.as_ref()).as_ref(), what)?;
                 let carried = svd.rank(ORDER_TOLERANCE);
-                (svd.u, svd.sigma, carried)
+                (svd.u, svd.values, carried)
             }
             Weighting::Cva => {
                 // Y_f beside U_f is [L₃₂ L₃₃] = V·diag(σ)·Zᵀ; the weight is diag(σ)⁺Vᵀ.
                 let all = self.future_outputs();
                 let beside = compressed(all.subcols(inputs, all.ncols() - inputs));
-                let whole = thin_svd(what, beside.as_ref())?;
+                let whole = thin_svd(beside.as_ref(), what)?;
                 let kept = whole.rank(WHITENING_TOLERANCE);
                 let directions = whole.u.subcols(0, kept);
                 let mut white = directions.transpose() * along;
                 for j in 0..white.ncols() {
-                    for (value, sigma) in white.col_as_slice_mut(j).iter_mut().zip(&whole.sigma) {
+                    for (value, sigma) in white.col_as_slice_mut(j).iter_mut().zip(&whole.values) {
                         *value /= sigma;
                     }
                 }
-                let svd = thin_svd(what, compressed(white.as_ref()).as_ref())?;
+                let svd = thin_svd(compressed(white.as_ref()).as_ref(), what)?;
                 let weighted =
-                    Mat::from_fn(kept, svd.u.ncols(), |i, j| whole.sigma[i] * svd.u[(i, j)]);
+                    Mat::from_fn(kept, svd.u.ncols(), |i, j| whole.values[i] * svd.u[(i, j)]);
                 let carried = svd.rank(ORDER_TOLERANCE);
-                (directions * weighted, svd.sigma, carried)
+                (directions * weighted, svd.values, carried)
             }
         };
         Ok(Projection {
