@@ -50,10 +50,13 @@
 
 pub mod chassis;
 pub mod driver;
+pub mod manoeuvre;
 pub mod metrics;
+pub mod paper_model;
 pub mod parameters;
 pub mod powertrain;
 pub mod road;
+pub mod sensors;
 pub mod simulation;
 pub mod steering;
 pub mod suspension;

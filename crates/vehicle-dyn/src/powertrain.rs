@@ -8,6 +8,17 @@ const LEAST_POWER_SPEED_M_S: f64 = 1.0;
 /// Wheel speed over which brake torque fades to zero at standstill, rad/s.
 const BRAKE_FADE_RAD_S: f64 = 1.0;
 
+/// What engine and brakes are asked for over one control tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LongitudinalDemand {
+    /// The vehicle's speed controller holds this speed, m/s.
+    TargetSpeed(f64),
+    /// Drive or brake force of mass times this acceleration, m/s², without speed control.
+    Acceleration(f64),
+    /// Both pedals released: neither drive nor brake force, as a test with dropped throttle asks.
+    Released,
+}
+
 /// Constants of engine, brakes and speed controller.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Powertrain {
@@ -57,16 +68,24 @@ impl Powertrain {
         }
     }
 
-    /// Rates of the powertrain's state at forward speed `speed_m_s`.
+    /// Rates of the powertrain's state at forward speed `speed_m_s` (m/s). The integral of the speed
+    /// controller rests while speed is not controlled.
     #[must_use]
     pub fn rates(
         &self,
         state: &PowertrainState,
         speed_m_s: f64,
-        target_speed_m_s: f64,
+        demand: LongitudinalDemand,
     ) -> PowertrainState {
-        let error = target_speed_m_s - speed_m_s;
-        let wanted = self.gain_per_s * error + state.integral_m_s2;
+        let (wanted, error) = match demand {
+            LongitudinalDemand::TargetSpeed(target_m_s) => {
+                let error = target_m_s - speed_m_s;
+                (self.gain_per_s * error + state.integral_m_s2, error)
+            }
+            // Without speed control there is no error to integrate.
+            LongitudinalDemand::Acceleration(asked_m_s2) => (asked_m_s2, 0.0),
+            LongitudinalDemand::Released => (0.0, 0.0),
+        };
         let wanted_n = self.total_mass_kg * wanted;
         let power_n = self.max_power_w / speed_m_s.abs().max(LEAST_POWER_SPEED_M_S);
         let given_n = wanted_n.clamp(-self.max_brake_n, self.max_drive_n.min(power_n));

@@ -5,13 +5,13 @@ mod common;
 use common::{TICK_S, on_flat, sedan};
 use nalgebra::{Vector2, Vector3};
 use vehicle_dyn::parameters::VehicleParameters;
-use vehicle_dyn::simulation::{Command, Simulation};
+use vehicle_dyn::simulation::{Command, LongitudinalDemand, Simulation};
 use vehicle_dyn::terrain::{Ground, Terrain};
 use vehicle_dyn::wheels::spin_axis;
 
 const NO_COMMAND: Command = Command {
     handwheel_rad: 0.0,
-    target_speed_m_s: 0.0,
+    longitudinal: LongitudinalDemand::TargetSpeed(0.0),
 };
 
 /// The sedan without anything that takes or gives energy.

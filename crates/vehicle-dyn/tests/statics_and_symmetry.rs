@@ -4,7 +4,9 @@ mod common;
 
 use common::{TICK_S, drive, on_flat, sedan, step_steer, three_turns};
 use vehicle_dyn::road::Course;
-use vehicle_dyn::simulation::{Command, InitialPose, Simulation, SimulationError};
+use vehicle_dyn::simulation::{
+    Command, InitialPose, LongitudinalDemand, Simulation, SimulationError,
+};
 use vehicle_dyn::terrain::Terrain;
 
 #[test]
@@ -185,7 +187,7 @@ fn a_command_that_is_no_number_stops_the_run_with_its_time_and_leaves_the_state(
     assert_eq!(
         message(Command {
             handwheel_rad: f64::NAN,
-            target_speed_m_s: 20.0
+            longitudinal: LongitudinalDemand::TargetSpeed(20.0),
         }),
         "command handwheel_rad = NaN at 1.25 s: must be a finite number; the simulation stopped \
          before it"
@@ -193,7 +195,7 @@ fn a_command_that_is_no_number_stops_the_run_with_its_time_and_leaves_the_state(
     assert!(
         message(Command {
             handwheel_rad: 0.0,
-            target_speed_m_s: f64::NAN
+            longitudinal: LongitudinalDemand::TargetSpeed(f64::NAN),
         })
         .contains("1.25 s")
     );

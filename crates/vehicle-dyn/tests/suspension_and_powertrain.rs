@@ -4,7 +4,7 @@ mod common;
 
 use common::sedan;
 use vehicle_dyn::parameters::PowertrainParameters;
-use vehicle_dyn::powertrain::{Powertrain, PowertrainState};
+use vehicle_dyn::powertrain::{LongitudinalDemand, Powertrain, PowertrainState};
 use vehicle_dyn::suspension::{AxleSuspension, Pair};
 
 const MASS_KG: f64 = 1000.0;
@@ -88,12 +88,12 @@ fn engine_and_brakes_answer_each_with_its_own_lag() {
         integral_m_s2: 0.0,
     };
     // 1 m/s too slow with a gain of 2 asks for 2000 N.
-    let faster = powertrain.rates(&state, 20.0, 21.0);
+    let faster = powertrain.rates(&state, 20.0, LongitudinalDemand::TargetSpeed(21.0));
     assert_pair(
         [faster.drive_n, faster.brake_n],
         [1500.0 / 0.25, -300.0 / 0.1],
     );
-    let slower = powertrain.rates(&state, 20.0, 19.0);
+    let slower = powertrain.rates(&state, 20.0, LongitudinalDemand::TargetSpeed(19.0));
     assert_pair(
         [slower.drive_n, slower.brake_n],
         [-500.0 / 0.25, 1700.0 / 0.1],
@@ -108,7 +108,9 @@ fn the_speed_controller_does_not_wind_up_what_engine_and_brakes_cannot_give() {
             integral_m_s2,
             ..PowertrainState::default()
         };
-        powertrain.rates(&state, 20.0, target_m_s).integral_m_s2
+        powertrain
+            .rates(&state, 20.0, LongitudinalDemand::TargetSpeed(target_m_s))
+            .integral_m_s2
     };
     // At 20 m/s the engine gives 5000 N and the brakes 11000 N: within that the integral grows.
     assert_pair([growth(0.0, 22.0), growth(0.0, 15.0)], [0.3, -0.75]);

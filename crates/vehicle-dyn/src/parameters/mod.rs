@@ -111,6 +111,23 @@ pub struct SuspensionParameters {
     pub camber_gain_front_rad_per_m: f64,
     /// Lean of a rear wheel's top towards the vehicle per metre of bump, rad/m.
     pub camber_gain_rear_rad_per_m: f64,
+    /// Present when the front wheels share a solid axle. Springs and dampers of that axle then act
+    /// where it says, not at the wheels.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub solid_axle_front: Option<SolidAxleParameters>,
+    /// Present when the rear wheels share a solid axle.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub solid_axle_rear: Option<SolidAxleParameters>,
+}
+
+/// Where the springs and dampers of a solid axle stand.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SolidAxleParameters {
+    /// Distance between the left and the right spring, m.
+    pub spring_spacing_m: f64,
+    /// Distance between the left and the right damper, m.
+    pub damper_spacing_m: f64,
 }
 
 /// Tyres: the paper's combined-slip Magic Formula (eq. magic) with its constants as data.
@@ -123,6 +140,12 @@ pub struct TyreParameters {
     pub vertical_stiffness_front_n_per_m: f64,
     /// Radial stiffness of one rear tyre, N/m.
     pub vertical_stiffness_rear_n_per_m: f64,
+    /// Distance between the middles of twin tyres on one rear wheel, m; 0 is a single tyre.
+    /// Stiffness, damping and the force law are those of both tyres together.
+    pub twin_spacing_rear_m: f64,
+    /// Sideways motion of the contact patch against the wheel per lateral force of one wheel, m/N;
+    /// 0 is rigid. It narrows the stand of a cornering vehicle.
+    pub lateral_compliance_m_per_n: f64,
     /// Radial damping of one tyre, N s/m.
     pub vertical_damping_n_s_per_m: f64,
     /// Peak friction of the tyre on a road of friction 1, at the load m g/4 (no unit). The road

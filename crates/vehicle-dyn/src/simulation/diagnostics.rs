@@ -49,10 +49,7 @@ impl Simulation {
             + 0.5 * omega.dot(&(inertia * omega));
         let gravity = dynamics.gravity_m_s2;
         let mut gravitational = -dynamics.body.mass_kg * gravity.dot(&state.position_m);
-        let input = HeldInput {
-            handwheel_rad: 0.0,
-            target_speed_m_s: 0.0,
-        };
+        let input = HeldInput::AT_REST;
         let (_, contacts) = dynamics.rates(state, &input, &self.terrain);
         let mut elastic = 0.0;
         for (i, contact) in contacts.iter().enumerate() {

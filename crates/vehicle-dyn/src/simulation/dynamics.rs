@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Quaternion, Vector3};
 
+use super::LongitudinalDemand;
 use super::state::{State, StateRate};
 use crate::chassis::{HubLoad, SprungBody, sum_corners};
 use crate::parameters::VehicleParameters;
@@ -21,8 +22,16 @@ const SIDE: [f64; 4] = [1.0, -1.0, 1.0, -1.0];
 pub(crate) struct HeldInput {
     /// Handwheel command within its end stops, rad.
     pub handwheel_rad: f64,
-    /// Target speed, m/s.
-    pub target_speed_m_s: f64,
+    /// What engine and brakes are asked for.
+    pub longitudinal: LongitudinalDemand,
+}
+
+impl HeldInput {
+    /// Straight ahead with released pedals.
+    pub const AT_REST: Self = Self {
+        handwheel_rad: 0.0,
+        longitudinal: LongitudinalDemand::Released,
+    };
 }
 
 /// The vehicle with every constant computed once. All fields are fixed after construction.
@@ -242,11 +251,9 @@ impl Dynamics {
                 contacts[3].slip_rate,
             ],
             steering: steering_rates,
-            powertrain: self.powertrain.rates(
-                &state.powertrain,
-                forward_speed,
-                input.target_speed_m_s,
-            ),
+            powertrain: self
+                .powertrain
+                .rates(&state.powertrain, forward_speed, input.longitudinal),
         };
         (rate, contacts)
     }

@@ -16,6 +16,7 @@ pub use state::State;
 use nalgebra::Vector3;
 
 use crate::parameters::{ParameterError, VehicleParameters};
+pub use crate::powertrain::LongitudinalDemand;
 use crate::terrain::Terrain;
 use crate::units::{DEGREE, KMH, wrap_angle};
 use dynamics::{Dynamics, HeldInput};
@@ -26,14 +27,16 @@ pub const DEFAULT_SUBSTEP_S: f64 = 1e-3;
 const LONGEST_TICK_S: f64 = 10.0;
 /// Largest speed a simulation may start with or be asked for, m/s.
 const LARGEST_SPEED_M_S: f64 = 150.0;
+/// Largest acceleration that may be asked for, m/s².
+const LARGEST_ACCELERATION_M_S2: f64 = 100.0;
 
 /// Inputs to the vehicle over one control tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Command {
     /// Handwheel angle before the steering actuator, positive to the left, rad.
     pub handwheel_rad: f64,
-    /// Target speed of the speed controller, m/s.
-    pub target_speed_m_s: f64,
+    /// What engine and brakes are asked for.
+    pub longitudinal: LongitudinalDemand,
 }
 
 impl Command {
@@ -42,7 +45,7 @@ impl Command {
     pub fn from_deg_kmh(handwheel_deg: f64, target_speed_kmh: f64) -> Self {
         Self {
             handwheel_rad: handwheel_deg * DEGREE,
-            target_speed_m_s: target_speed_kmh * KMH,
+            longitudinal: LongitudinalDemand::TargetSpeed(target_speed_kmh * KMH),
         }
     }
 }
@@ -267,16 +270,22 @@ impl Simulation {
         if !command.handwheel_rad.is_finite() {
             return refuse("handwheel_rad", command.handwheel_rad, "a finite number");
         }
-        if !(0.0..=LARGEST_SPEED_M_S).contains(&command.target_speed_m_s) {
-            return refuse(
-                "target_speed_m_s",
-                command.target_speed_m_s,
-                "in [0, 150] m/s",
-            );
+        match command.longitudinal {
+            LongitudinalDemand::TargetSpeed(speed)
+                if !(0.0..=LARGEST_SPEED_M_S).contains(&speed) =>
+            {
+                return refuse("target_speed_m_s", speed, "in [0, 150] m/s");
+            }
+            LongitudinalDemand::Acceleration(asked)
+                if !(-LARGEST_ACCELERATION_M_S2..=LARGEST_ACCELERATION_M_S2).contains(&asked) =>
+            {
+                return refuse("acceleration_m_s2", asked, "in [-100, 100] m/s²");
+            }
+            _ => {}
         }
         Ok(HeldInput {
             handwheel_rad: self.dynamics.steering.limited_rad(command.handwheel_rad),
-            target_speed_m_s: command.target_speed_m_s,
+            longitudinal: command.longitudinal,
         })
     }
 

@@ -16,10 +16,7 @@ impl Simulation {
     pub fn observation(&self) -> Observation {
         let (state, dynamics) = (&self.state, &self.dynamics);
         // Contacts follow from the state alone, so any input will do.
-        let input = HeldInput {
-            handwheel_rad: 0.0,
-            target_speed_m_s: 0.0,
-        };
+        let input = HeldInput::AT_REST;
         let (_, contacts) = dynamics.rates(state, &input, &self.terrain);
         let rotation = state.rotation();
         let (position, velocity) = self.centre_of_gravity();

@@ -4,7 +4,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::dynamics::{Dynamics, HeldInput};
 use super::state::State;
-use super::{InitialPose, LARGEST_SPEED_M_S, SimulationError, rk4};
+use super::{InitialPose, LARGEST_SPEED_M_S, LongitudinalDemand, SimulationError, rk4};
 use crate::powertrain::PowertrainState;
 use crate::terrain::Terrain;
 use crate::units::GRAVITY_M_S2;
@@ -64,7 +64,7 @@ pub(super) fn rolling_state(dynamics: &Dynamics, speed_m_s: f64, substep_s: f64)
     };
     let input = HeldInput {
         handwheel_rad: 0.0,
-        target_speed_m_s: speed_m_s,
+        longitudinal: LongitudinalDemand::TargetSpeed(speed_m_s),
     };
     let ground = Terrain::flat(1.0);
     // Positive and at most 8 s over the least allowed step, so it fits.

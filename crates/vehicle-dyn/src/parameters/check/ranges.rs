@@ -1,6 +1,6 @@
 //! One row per value: field, value, interval, unit.
 
-use crate::parameters::{ParameterError, VehicleParameters};
+use crate::parameters::{ParameterError, SolidAxleParameters, VehicleParameters};
 
 /// An allowed interval; its upper end belongs to it.
 #[derive(Clone, Copy)]
@@ -62,6 +62,15 @@ pub(super) fn check(vehicle: &VehicleParameters, origin: &str) -> Result<(), Par
     check_rows("mass", &mass_rows(vehicle), origin)?;
     check_rows("geometry", &geometry_rows(vehicle), origin)?;
     check_rows("suspension", &suspension_rows(vehicle), origin)?;
+    let suspension = &vehicle.suspension;
+    for (table, axle) in [
+        ("suspension.solid_axle_front", &suspension.solid_axle_front),
+        ("suspension.solid_axle_rear", &suspension.solid_axle_rear),
+    ] {
+        if let Some(axle) = axle {
+            check_rows(table, &solid_axle_rows(axle), origin)?;
+        }
+    }
     check_rows("tyre", &tyre_rows(vehicle), origin)?;
     check_rows("wheel", &wheel_rows(vehicle), origin)?;
     check_rows("steering", &steering_rows(vehicle), origin)?;
@@ -249,7 +258,15 @@ fn suspension_rows(vehicle: &VehicleParameters) -> [Row<'_>; 13] {
     ]
 }
 
-fn tyre_rows(vehicle: &VehicleParameters) -> [Row<'_>; 15] {
+fn solid_axle_rows(v: &SolidAxleParameters) -> [Row<'_>; 2] {
+    let spacing = above(0.0, 5.0);
+    [
+        ("spring_spacing_m", v.spring_spacing_m, spacing, "m"),
+        ("damper_spacing_m", v.damper_spacing_m, spacing, "m"),
+    ]
+}
+
+fn tyre_rows(vehicle: &VehicleParameters) -> [Row<'_>; 17] {
     let v = &vehicle.tyre;
     let radial = within(1e4, 1e8);
     let (radial_front, radial_rear) = (
@@ -281,6 +298,18 @@ fn tyre_rows(vehicle: &VehicleParameters) -> [Row<'_>; 15] {
             radial_rear,
             radial,
             "N/m",
+        ),
+        (
+            "twin_spacing_rear_m",
+            v.twin_spacing_rear_m,
+            within(0.0, 1.0),
+            "m",
+        ),
+        (
+            "lateral_compliance_m_per_n",
+            v.lateral_compliance_m_per_n,
+            within(0.0, 1e-3),
+            "m/N",
         ),
         (
             "vertical_damping_n_s_per_m",
