@@ -10,14 +10,14 @@
 //! ```
 //!
 //! The strut pushes the body up and the mass down by `P_i` along z. In x and y, and for all
-//! moments, the joint is rigid. With contact force `F_i` at `r_i + d_i`, gravity `g`, and
+//! moments, the joint is rigid. With contact force `F_i` of moment `N_i` about `r_i`, gravity `g`, and
 //! `E = diag(1, 1, 0)`:
 //!
 //! ```text
 //! wheel, z      m_i ẇ_i = F_iz + m_i g_z − P_i − m_i (a + α × r_i + c_i)_z
 //! joint         Q_i     = E [F_i + m_i g − m_i (a + α × r_i + c_i)] + P_i e_z
 //! body          m_s a   = m_s g + f_x + Σ Q_i
-//!               I α     = −ω × I ω + n_x + Σ (r_i × Q_i + d_i × F_i)
+//!               I α     = −ω × I ω + n_x + Σ (r_i × Q_i + N_i)
 //! ```
 //!
 //! (`f_x`, `n_x`: other forces and moments, such as drag and wheel spin.) Putting `Q_i` in gives a
@@ -44,8 +44,8 @@ pub struct HubLoad {
     pub rate_m_s: f64,
     /// Force of the ground, N.
     pub contact_force_n: Vector3<f64>,
-    /// From the wheel centre to the contact point, m.
-    pub contact_arm_m: Vector3<f64>,
+    /// Moment of that force about the wheel centre, N m.
+    pub contact_moment_nm: Vector3<f64>,
     /// Force of strut and links on the body, up, N.
     pub strut_n: f64,
 }
@@ -107,8 +107,7 @@ impl SprungBody {
         for (i, hub) in hubs.iter().enumerate() {
             let rigid = hub.contact_force_n + (gravity_m_s2 - apparents[i]) * hub.mass_kg;
             forces[i] = Vector3::new(rigid.x, rigid.y, hub.strut_n);
-            moments[i] =
-                hub.position_m.cross(&forces[i]) + hub.contact_arm_m.cross(&hub.contact_force_n);
+            moments[i] = hub.position_m.cross(&forces[i]) + hub.contact_moment_nm;
         }
         let force = gravity_m_s2 * self.mass_kg + force_n + sum_corners(&forces);
         let gyroscopic = omega.cross(&(self.inertia_kg_m2 * omega));

@@ -28,6 +28,11 @@ pub struct Wheel {
     pub radial: RadialSpring,
     /// Unloaded radius, m.
     pub radius_m: f64,
+    /// Half the distance between the middles of twin tyres, m; 0 for a single tyre. Stiffness,
+    /// damping and force law are those of both together.
+    pub half_twin_spacing_m: f64,
+    /// Sideways motion of the contact patch against the wheel per lateral force, m/N.
+    pub lateral_compliance_m_per_n: f64,
     /// Side slip per rad of camber (no unit).
     pub camber_thrust_ratio: f64,
     /// 1/relaxation length, `[longitudinal, lateral]`, 1/m.
@@ -49,13 +54,13 @@ pub struct WheelMotion {
     pub velocity_m_s: Vector3<f64>,
     /// Angular rate of the body, rad/s.
     pub angular_rad_s: Vector3<f64>,
-    /// Rate of the wheel travel, bump positive, m/s.
-    pub travel_rate_m_s: f64,
-    /// Turning of the wheel carrier against the body per travel, rad/m.
-    pub lean_per_travel: Vector3<f64>,
-    /// Sideways motion of the contact point against the body per travel, positive to the left (no
-    /// unit). The links move the contact about the roll centre, so this is their jacking slope.
-    pub scrub_per_travel: f64,
+    /// Rate of the wheel's lean against the body, as a tangent, 1/s.
+    pub lean_rate_per_s: f64,
+    /// Turning of the wheel carrier against the body per lean (no unit).
+    pub turn_per_lean: Vector3<f64>,
+    /// Sideways speed of the contact point against the body by the links' guidance, positive to the
+    /// left, m/s.
+    pub scrub_m_s: f64,
     /// Height of the wheel centre above the ground plane along its normal, m.
     pub height_m: f64,
     /// Unit normal of the ground plane.
@@ -71,20 +76,23 @@ pub struct WheelMotion {
 pub struct Contact {
     /// Load along the ground normal, N.
     pub load_n: f64,
-    /// Radial compression of the tyre, m; negative is the gap under a lifted wheel.
+    /// Radial compression of the tyre, m; negative is the gap under a lifted wheel. Of twin tyres
+    /// the larger one.
     pub deflection_m: f64,
+    /// Energy stored in the tyre's radial spring, J.
+    pub elastic_j: f64,
     /// Force on the wheel in body axes, N.
     pub force_n: Vector3<f64>,
     /// The part of [`Contact::force_n`] in the ground plane, N.
     pub tangential_n: Vector3<f64>,
-    /// From wheel centre to contact point, m.
-    pub arm_m: Vector3<f64>,
+    /// Moment of the force about the wheel centre in body axes, N m.
+    pub moment_nm: Vector3<f64>,
     /// Rate of the relaxed slip, 1/s. A wheel without load loses its slip.
     pub slip_rate: [f64; 2],
     /// Moment of the ground about the spin axis, N m.
     pub spin_moment_nm: f64,
-    /// What the load does to the wheel travel by leaning the wheel (virtual work), N.
-    pub lean_force_n: f64,
+    /// Work of the load per lean of the wheel, N m.
+    pub lean_moment_nm: f64,
 }
 
 impl Wheel {
@@ -92,6 +100,57 @@ impl Wheel {
     #[must_use]
     #[inline]
     pub fn contact(&self, motion: &WheelMotion, ground: &Ground) -> Contact {
+        if self.half_twin_spacing_m > 0.0 {
+            self.twin_contact(motion, ground)
+        } else {
+            self.tyre_contact(motion, ground, 1.0)
+        }
+    }
+
+    /// Two tyres on one wheel: they share spin and slip, each has its own load.
+    fn twin_contact(&self, motion: &WheelMotion, ground: &Ground) -> Contact {
+        let axis_rate = motion.turn_per_lean.cross(&motion.axis) * motion.lean_rate_per_s;
+        let tyre = |offset_m: f64| {
+            let beside = motion.axis * offset_m;
+            let moved = WheelMotion {
+                velocity_m_s: motion.velocity_m_s
+                    + motion.angular_rad_s.cross(&beside)
+                    + axis_rate * offset_m,
+                height_m: motion.height_m + beside.dot(&motion.normal),
+                ..*motion
+            };
+            let mut contact = self.tyre_contact(&moved, ground, 0.5);
+            contact.moment_nm += beside.cross(&contact.force_n);
+            // The tyre's centre rises with the lean by its distance from the wheel's centre.
+            contact.lean_moment_nm +=
+                contact.load_n * motion.turn_per_lean.cross(&beside).dot(&motion.normal);
+            contact
+        };
+        let [one, other] = [
+            tyre(self.half_twin_spacing_m),
+            tyre(-self.half_twin_spacing_m),
+        ];
+        let slip_rate = match (one.load_n > 0.0, other.load_n > 0.0) {
+            (true, false) => one.slip_rate,
+            (false, true) => other.slip_rate,
+            _ => [0, 1].map(|i| 0.5 * (one.slip_rate[i] + other.slip_rate[i])),
+        };
+        Contact {
+            load_n: one.load_n + other.load_n,
+            deflection_m: one.deflection_m.max(other.deflection_m),
+            elastic_j: one.elastic_j + other.elastic_j,
+            force_n: one.force_n + other.force_n,
+            tangential_n: one.tangential_n + other.tangential_n,
+            moment_nm: one.moment_nm + other.moment_nm,
+            slip_rate,
+            spin_moment_nm: one.spin_moment_nm + other.spin_moment_nm,
+            lean_moment_nm: one.lean_moment_nm + other.lean_moment_nm,
+        }
+    }
+
+    /// One tyre that has `share` of the wheel's stiffness and force: 1, or ½ of a twin.
+    #[inline]
+    fn tyre_contact(&self, motion: &WheelMotion, ground: &Ground, share: f64) -> Contact {
         let normal = motion.normal;
         let forward = motion.axis.cross(&normal);
         let inverse_cos = 1.0 / forward.norm().max(LEAST_COS_CAMBER);
@@ -103,11 +162,10 @@ impl Wheel {
         let arm = (motion.axis * sin_camber - normal) * (inverse_cos * distance);
         let deflection = self.radius_m - distance;
         let contact_velocity = motion.velocity_m_s + motion.angular_rad_s.cross(&arm);
-        // Rise of the contact point along the normal per travel, because the wheel leans with it.
-        let rise_per_travel = arm.cross(&normal).dot(&motion.lean_per_travel);
-        let closing_speed =
-            -contact_velocity.dot(&normal) - rise_per_travel * motion.travel_rate_m_s;
-        let load = self.radial.load_n(deflection, closing_speed, inverse_cos);
+        // Rise of the contact point along the normal per lean of the wheel.
+        let rise_per_lean = arm.cross(&normal).dot(&motion.turn_per_lean);
+        let closing_speed = -contact_velocity.dot(&normal) - rise_per_lean * motion.lean_rate_per_s;
+        let load = share * self.radial.load_n(deflection, closing_speed, inverse_cos);
 
         // The wheel turns under its carrier, so the carrier's pitch does not move the tread: the
         // longitudinal slip speed is that of the wheel centre, the lateral one of the contact.
@@ -115,8 +173,7 @@ impl Wheel {
         let tread_speed = motion.spin_rad_s * rolling_radius;
         let speed = motion.velocity_m_s.dot(&forward);
         // Only across the wheel: the part along a steered wheel, `scrub * forward.y`, is left out.
-        let scrub = motion.scrub_per_travel * motion.travel_rate_m_s;
-        let lateral_speed = contact_velocity.dot(&left) + scrub * left.y;
+        let lateral_speed = contact_velocity.dot(&left) + motion.scrub_m_s * left.y;
         let slip_speed = [tread_speed - speed, -lateral_speed];
         let slide = (slip_speed[0] * slip_speed[0] + slip_speed[1] * slip_speed[1]).sqrt();
         let transport = speed.abs().max(slide * SLIP_PER_LARGEST);
@@ -133,8 +190,13 @@ impl Wheel {
             motion.slip[0],
             motion.slip[1] - self.camber_thrust_ratio * sin_camber,
         ];
-        let [longitudinal, lateral] = self.formula.force_n(load, ground.friction, slip);
+        // The force law is the wheel's: a twin tyre gives its share of what a wheel would give
+        // whose tyres all stood as this one.
+        let wheel_force = self.formula.force_n(load / share, ground.friction, slip);
+        let [longitudinal, lateral] = [share * wheel_force[0], share * wheel_force[1]];
         let tangential = forward * longitudinal + left * lateral;
+        let force = tangential + normal * load;
+        let patch = arm + left * (self.lateral_compliance_m_per_n * wheel_force[1]);
         let rolling = self.rolling_resistance
             * load
             * rolling_radius
@@ -142,12 +204,13 @@ impl Wheel {
         Contact {
             load_n: load,
             deflection_m: deflection,
-            force_n: tangential + normal * load,
+            elastic_j: share * self.radial.energy_j(deflection),
+            force_n: force,
             tangential_n: tangential,
-            arm_m: arm,
+            moment_nm: patch.cross(&force),
             slip_rate,
             spin_moment_nm: -longitudinal * rolling_radius - rolling,
-            lean_force_n: load * rise_per_travel,
+            lean_moment_nm: load * rise_per_lean,
         }
     }
 

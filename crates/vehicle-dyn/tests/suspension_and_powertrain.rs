@@ -5,7 +5,7 @@ mod common;
 use common::sedan;
 use vehicle_dyn::parameters::PowertrainParameters;
 use vehicle_dyn::powertrain::{LongitudinalDemand, Powertrain, PowertrainState};
-use vehicle_dyn::suspension::{AxleSuspension, Pair};
+use vehicle_dyn::suspension::{AxleSuspension, Guidance, Pair};
 
 const MASS_KG: f64 = 1000.0;
 
@@ -18,8 +18,10 @@ const AXLE: AxleSuspension = AxleSuspension {
     travel_m: 0.08,
     stop_n_per_m: 200_000.0,
     stop_n_per_m2: 4e6,
-    jacking_slope: 0.1,
-    camber_gain_rad_per_m: 0.4,
+    guidance: Guidance::Independent {
+        jacking_slope: 0.1,
+        camber_gain_rad_per_m: 0.4,
+    },
 };
 
 fn powertrain() -> PowertrainParameters {

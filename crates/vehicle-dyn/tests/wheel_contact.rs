@@ -5,7 +5,7 @@ mod common;
 use common::{TICK_S, on_flat, sedan};
 use nalgebra::Vector3;
 use vehicle_dyn::simulation::Command;
-use vehicle_dyn::suspension::AxleSuspension;
+use vehicle_dyn::suspension::{AxleSuspension, Guidance};
 use vehicle_dyn::terrain::Ground;
 use vehicle_dyn::tyre::{MagicFormula, RadialSpring};
 use vehicle_dyn::wheels::{Contact, Wheel, WheelMotion, spin_axis};
@@ -30,6 +30,8 @@ fn wheel() -> Wheel {
             damping_n_s_per_m: 0.0,
         },
         radius_m: 0.344,
+        half_twin_spacing_m: 0.0,
+        lateral_compliance_m_per_n: 0.0,
         camber_thrust_ratio: 0.05,
         inverse_relaxation: [1.0 / LONGITUDINAL_RELAXATION_M, 1.0 / LATERAL_RELAXATION_M],
         rolling_resistance: 0.01,
@@ -44,9 +46,9 @@ fn rolling() -> WheelMotion {
         axis: Vector3::y(),
         velocity_m_s: Vector3::new(SPEED_M_S, 0.0, 0.0),
         angular_rad_s: Vector3::zeros(),
-        travel_rate_m_s: 0.0,
-        lean_per_travel: Vector3::zeros(),
-        scrub_per_travel: 0.0,
+        lean_rate_per_s: 0.0,
+        turn_per_lean: Vector3::zeros(),
+        scrub_m_s: 0.0,
         height_m: 0.344 - DEFLECTION_M,
         normal: Vector3::z(),
         spin_rad_s: SPEED_M_S / wheel().rolling_radius_m(DEFLECTION_M),
@@ -127,17 +129,13 @@ fn a_leaning_wheel_pushes_towards_the_side_it_leans_to() {
 
 #[test]
 fn travel_about_the_roll_centre_scrubs_the_tyre_sideways() {
-    for (scrub_per_travel, rate) in [(0.15, 0.2), (-0.15, 0.2), (0.15, -0.2)] {
+    for scrub_m_s in [0.03, -0.03] {
         let seen = contact(&WheelMotion {
-            scrub_per_travel,
-            travel_rate_m_s: rate,
+            scrub_m_s,
             ..rolling()
         });
         // Moving left is a slip that pushes to the right.
-        assert_close(
-            seen.slip_rate[1],
-            -scrub_per_travel * rate / LATERAL_RELAXATION_M,
-        );
+        assert_close(seen.slip_rate[1], -scrub_m_s / LATERAL_RELAXATION_M);
     }
 }
 
@@ -153,8 +151,10 @@ fn the_jacking_pair_does_no_work_of_its_own_at_a_wheel_that_points_ahead() {
         travel_m: 0.1,
         stop_n_per_m: 0.0,
         stop_n_per_m2: 0.0,
-        jacking_slope: slope,
-        camber_gain_rad_per_m: 0.0,
+        guidance: Guidance::Independent {
+            jacking_slope: slope,
+            camber_gain_rad_per_m: 0.0,
+        },
     };
     for (side, sign) in [(0, 1.0), (1, -1.0)] {
         for steer in [0.0_f64, 0.1] {
@@ -163,8 +163,7 @@ fn the_jacking_pair_does_no_work_of_its_own_at_a_wheel_that_points_ahead() {
             let motion = WheelMotion {
                 axis: spin_axis(steer.sin_cos().into(), 0.0)[0],
                 velocity_m_s: Vector3::new(SPEED_M_S, -0.4, 0.0),
-                travel_rate_m_s: rate,
-                scrub_per_travel: sign * slope,
+                scrub_m_s: sign * slope * rate,
                 slip,
                 ..rolling()
             };

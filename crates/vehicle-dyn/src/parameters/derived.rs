@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::VehicleParameters;
+use super::{SolidAxleParameters, VehicleParameters};
 use crate::units::GRAVITY_M_S2;
 
 /// Figures computed from the parameters of a vehicle at rest on level ground.
@@ -59,6 +59,13 @@ impl VehicleParameters {
         let cg_to_front_axle = (sprung * front + unsprung_rear * wheelbase) / total;
         let cg_shift = front - cg_to_front_axle;
         let (half_front, half_rear) = (0.5 * geometry.track_front_m, 0.5 * geometry.track_rear_m);
+        let spring_arm = |solid: &Option<SolidAxleParameters>, half_track: f64| {
+            solid
+                .as_ref()
+                .map_or(half_track, |axle| 0.5 * axle.spring_spacing_m)
+        };
+        let spring_arm_front = spring_arm(&suspension.solid_axle_front, half_front);
+        let spring_arm_rear = spring_arm(&suspension.solid_axle_rear, half_rear);
         let total_yaw_inertia = mass.sprung_yaw_inertia_kg_m2
             + unsprung_front * (front * front + half_front * half_front)
             + unsprung_rear * (rear * rear + half_rear * half_rear)
@@ -74,13 +81,13 @@ impl VehicleParameters {
             total_yaw_inertia_kg_m2: total_yaw_inertia,
             roll_stiffness_front_nm_per_rad: 2.0
                 * suspension.spring_rate_front_n_per_m
-                * half_front
-                * half_front
+                * spring_arm_front
+                * spring_arm_front
                 + suspension.anti_roll_front_nm_per_rad,
             roll_stiffness_rear_nm_per_rad: 2.0
                 * suspension.spring_rate_rear_n_per_m
-                * half_rear
-                * half_rear
+                * spring_arm_rear
+                * spring_arm_rear
                 + suspension.anti_roll_rear_nm_per_rad,
         }
     }

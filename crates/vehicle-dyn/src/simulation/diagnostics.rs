@@ -61,7 +61,7 @@ impl Simulation {
                 + 0.5 / wheel.inverse_spin_inertia * state.spin_rad_s[i].powi(2);
             gravitational -=
                 dynamics.unsprung_kg[i] * gravity.dot(&(state.position_m + rotation * hub));
-            elastic += wheel.radial.energy_j(contact.deflection_m);
+            elastic += contact.elastic_j;
         }
         for (axle, wheels) in dynamics.axles.iter().zip([[0, 1], [2, 3]]) {
             elastic += axle.energy_j(wheels.map(|i: usize| state.travel_m[i]));
@@ -95,8 +95,9 @@ impl Simulation {
             let mut velocity = body_velocity + omega.cross(&hub);
             velocity.z += state.travel_rate_m_s[i];
             angular += (body_arm + hub).cross(&velocity) * dynamics.unsprung_kg[i];
-            let side = if i % 2 == 0 { 1.0 } else { -1.0 };
-            let lean = side * dynamics.axles[i / 2].camber_gain_rad_per_m * state.travel_m[i];
+            let axle = 2 * (i / 2);
+            let travel = [state.travel_m[axle], state.travel_m[axle + 1]];
+            let lean = dynamics.axles[i / 2].guidance.lean(travel)[i % 2];
             let [axis, ..] = spin_axis(if i < 2 { steer } else { [0.0, 1.0] }, lean);
             angular += axis * (dynamics.wheels[i].gyroscopic_inertia * state.spin_rad_s[i]);
         }

@@ -8,7 +8,7 @@ use crate::chassis::{HubLoad, SprungBody, sum_corners};
 use crate::parameters::VehicleParameters;
 use crate::powertrain::Powertrain;
 use crate::steering::SteeringActuator;
-use crate::suspension::AxleSuspension;
+use crate::suspension::{AxleSuspension, Guidance};
 use crate::terrain::Terrain;
 use crate::tyre::{MagicFormula, RadialSpring};
 use crate::units::GRAVITY_M_S2;
@@ -90,6 +90,12 @@ impl Dynamics {
                 damping_n_s_per_m: tyre.vertical_damping_n_s_per_m,
             },
             radius_m: tyre.unloaded_radius_m,
+            half_twin_spacing_m: if axle == 0 {
+                0.0
+            } else {
+                0.5 * tyre.twin_spacing_rear_m
+            },
+            lateral_compliance_m_per_n: tyre.lateral_compliance_m_per_n,
             camber_thrust_ratio: tyre.camber_thrust_ratio,
             inverse_relaxation: [
                 1.0 / tyre.relaxation_length_longitudinal_m,
@@ -164,6 +170,13 @@ impl Dynamics {
         let steering_rates = self.steering.rates(state.steering, input.handwheel_rad);
         let steer_rate = self.steering.road_wheel_rad(steering_rates[0]);
 
+        let (travel, rate) = (&state.travel_m, &state.travel_rate_m_s);
+        let guided = [0, 1].map(|axle| {
+            let guidance = &self.axles[axle].guidance;
+            let pair = |of: &[f64; 4]| [of[2 * axle], of[2 * axle + 1]];
+            let (lean, lean_rate) = (guidance.lean(pair(travel)), guidance.lean(pair(rate)));
+            (lean, lean_rate, guidance.scrub_m_s(pair(rate)))
+        });
         let mut contacts = [Contact::default(); 4];
         let mut hubs_m = [Vector3::zeros(); 4];
         let mut axes = [Vector3::zeros(); 4];
@@ -172,14 +185,14 @@ impl Dynamics {
             let wheel = &self.wheels[i];
             let mut hub = self.hub_m[i];
             hub.z += state.travel_m[i];
-            let camber_gain = SIDE[i] * self.axles[i / 2].camber_gain_rad_per_m;
             let (wheel_steer, wheel_steer_rate) = if i < 2 {
                 (steer, steer_rate)
             } else {
                 ([0.0, 1.0], 0.0)
             };
-            let [axis, by_steer, by_lean] = spin_axis(wheel_steer, camber_gain * state.travel_m[i]);
-            let lean_rate = camber_gain * state.travel_rate_m_s[i];
+            let (leans, lean_rates, scrubs) = &guided[i / 2];
+            let [axis, by_steer, by_lean] = spin_axis(wheel_steer, leans[i % 2]);
+            let lean_rate = lean_rates[i % 2];
             let mut hub_velocity = velocity + omega.cross(&hub);
             hub_velocity.z += state.travel_rate_m_s[i];
 
@@ -191,9 +204,9 @@ impl Dynamics {
                     axis,
                     velocity_m_s: hub_velocity,
                     angular_rad_s: omega,
-                    travel_rate_m_s: state.travel_rate_m_s[i],
-                    lean_per_travel: axis.cross(&by_lean) * camber_gain,
-                    scrub_per_travel: SIDE[i] * self.axles[i / 2].jacking_slope,
+                    lean_rate_per_s: lean_rate,
+                    turn_per_lean: axis.cross(&by_lean),
+                    scrub_m_s: scrubs[i % 2],
                     height_m: (world.z - ground.height_m) * normal.z,
                     normal: to_body * normal,
                     spin_rad_s: state.spin_rad_s[i],
@@ -213,8 +226,8 @@ impl Dynamics {
             position_m: hubs_m[i],
             rate_m_s: state.travel_rate_m_s[i],
             contact_force_n: contacts[i].force_n,
-            contact_arm_m: contacts[i].arm_m,
-            strut_n: struts[i] - contacts[i].lean_force_n,
+            contact_moment_nm: contacts[i].moment_nm,
+            strut_n: struts[i],
         };
         let hubs = [hub_load(0), hub_load(1), hub_load(2), hub_load(3)];
         // What changes the wheels' angular momentum is taken from the body: torques between the
@@ -279,14 +292,19 @@ impl Dynamics {
     fn struts(&self, state: &State, contacts: &[Contact; 4]) -> [f64; 4] {
         let axle = |axle: usize| {
             let (left, right) = (2 * axle, 2 * axle + 1);
-            self.axles[axle].forces_n(
+            let forces = self.axles[axle].forces_n(
                 [state.travel_m[left], state.travel_m[right]],
                 [state.travel_rate_m_s[left], state.travel_rate_m_s[right]],
                 [
                     contacts[left].tangential_n.y,
                     contacts[right].tangential_n.y,
                 ],
-            )
+            );
+            let lean = self.axles[axle].guidance.lean_forces_n([
+                contacts[left].lean_moment_nm,
+                contacts[right].lean_moment_nm,
+            ]);
+            [forces[0] - lean[0], forces[1] - lean[1]]
         };
         let ([front_left, front_right], [rear_left, rear_right]) = (axle(0), axle(1));
         [front_left, front_right, rear_left, rear_right]
@@ -316,6 +334,26 @@ fn axle_suspension(vehicle: &VehicleParameters, axle: usize, static_load_n: f64)
         geometry.roll_centre_height_front_m,
         geometry.roll_centre_height_rear_m,
     );
+    let solid = if axle == 0 {
+        &suspension.solid_axle_front
+    } else {
+        &suspension.solid_axle_rear
+    };
+    let guidance = match solid {
+        None => Guidance::Independent {
+            jacking_slope: roll_centre / (0.5 * track),
+            camber_gain_rad_per_m: pick(
+                suspension.camber_gain_front_rad_per_m,
+                suspension.camber_gain_rear_rad_per_m,
+            ),
+        },
+        Some(solid) => Guidance::Solid {
+            jacking_slope: roll_centre / track,
+            inverse_track_per_m: 1.0 / track,
+            spring_share: solid.spring_spacing_m / track,
+            damper_share: solid.damper_spacing_m / track,
+        },
+    };
     AxleSuspension {
         preload_n: static_load_n - unsprung * GRAVITY_M_S2,
         spring_n_per_m: pick(
@@ -334,76 +372,9 @@ fn axle_suspension(vehicle: &VehicleParameters, axle: usize, static_load_n: f64)
         travel_m: suspension.travel_m,
         stop_n_per_m: suspension.bump_stop_n_per_m,
         stop_n_per_m2: suspension.bump_stop_n_per_m2,
-        jacking_slope: roll_centre / (0.5 * track),
-        camber_gain_rad_per_m: pick(
-            suspension.camber_gain_front_rad_per_m,
-            suspension.camber_gain_rear_rad_per_m,
-        ),
+        guidance,
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn assert_close(found: f64, expected: f64) {
-        assert!(
-            (found - expected).abs() < 1e-12 * (1.0 + expected.abs()),
-            "{found} instead of {expected}"
-        );
-    }
-
-    /// The sedan with values that differ wherever two could be mistaken for each other.
-    fn vehicle() -> VehicleParameters {
-        let mut vehicle = crate::vehicles::embedded("sedan").expect("embedded");
-        vehicle.tyre.relaxation_length_longitudinal_m = 0.125;
-        vehicle.tyre.relaxation_length_lateral_m = 0.5;
-        vehicle.tyre.vertical_stiffness_front_n_per_m = 180_000.0;
-        vehicle.wheel.spin_inertia_front_kg_m2 = 1.25;
-        vehicle.wheel.spin_inertia_rear_kg_m2 = 2.0;
-        vehicle.wheel.gyroscopic_inertia_rear_kg_m2 = 0.8;
-        vehicle
-    }
-
-    #[test]
-    fn each_wheel_gets_the_constants_of_its_axle() {
-        let vehicle = vehicle();
-        let dynamics = Dynamics::new(&vehicle);
-        for (i, wheel) in dynamics.wheels.iter().enumerate() {
-            let pick = |front: f64, rear: f64| if i < 2 { front } else { rear };
-            let [longitudinal, lateral] = wheel.inverse_relaxation;
-            assert_close(longitudinal, 8.0);
-            assert_close(lateral, 2.0);
-            assert_close(wheel.radial.stiffness_n_per_m, pick(180_000.0, 190_000.0));
-            assert_close(wheel.inverse_spin_inertia, pick(0.8, 0.5));
-            assert_close(wheel.gyroscopic_inertia, pick(0.9, 0.8));
-            assert_close(wheel.camber_thrust_ratio, 0.046);
-            // B1 is the only difference between the formulas of the axles.
-            let ratio = wheel.formula.stiffness_n(3000.0, 1.0)
-                / dynamics.wheels[0].formula.stiffness_n(3000.0, 1.0);
-            assert_close(ratio, pick(1.0, 13.5 / 11.0));
-        }
-    }
-
-    #[test]
-    fn each_axle_gets_its_own_springs_dampers_and_roll_centre() {
-        let vehicle = vehicle();
-        let figures = vehicle.derived();
-        let [front, rear] = Dynamics::new(&vehicle).axles;
-        assert_close(front.spring_n_per_m, 25_000.0);
-        assert_close(rear.spring_n_per_m, 22_000.0);
-        assert_close(front.bump_n_s_per_m, 1500.0);
-        assert_close(front.rebound_n_s_per_m, 2800.0);
-        assert_close(rear.bump_n_s_per_m, 1400.0);
-        assert_close(rear.rebound_n_s_per_m, 2600.0);
-        assert_close(front.jacking_slope, 0.06 / (0.5 * 1.3868));
-        assert_close(rear.jacking_slope, 0.12 / (0.5 * 1.3640));
-        assert_close(front.anti_roll_n_per_m, 16_000.0 / (1.3868 * 1.3868));
-        assert_close(rear.anti_roll_n_per_m, 6000.0 / (1.3640 * 1.3640));
-        assert_close(
-            rear.preload_n,
-            figures.static_load_rear_n - 31.9 * GRAVITY_M_S2,
-        );
-        assert_close(rear.camber_gain_rad_per_m, 0.9055);
-    }
-}
+mod tests;
