@@ -8,5 +8,6 @@ pub mod backend;
 pub mod case;
 pub mod output;
 pub mod plant;
+pub mod reference;
 pub mod replay;
 pub mod synthetic;

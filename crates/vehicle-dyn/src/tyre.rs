@@ -176,7 +176,7 @@ pub struct RadialSpring {
 impl RadialSpring {
     /// Force normal to the ground plane, N, never negative.
     ///
-    /// `deflection_m` is the radial compression `ρ = R0 − h/cos γ` in the wheel plane,
+    /// `deflection_m` is the radial compression `ρ = R0 − r_c − (h − r_c)/cos γ` in the wheel plane,
     /// `closing_speed_m_s` the speed of the contact point into the ground along its normal,
     /// `inverse_cos` one over the cosine of the camber. The elastic part `k ρ/cos γ` at the contact point is the gradient of `½ k ρ²` for both height
     /// and camber, so it gives and takes no energy on a plane.

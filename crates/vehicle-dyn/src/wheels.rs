@@ -1,7 +1,9 @@
 //! One wheel on its local ground plane: contact point, load, slip and spin.
 //!
-//! The wheel is a thin disc of radius `R0` about its centre. The contact point lies in the disc
-//! plane, straight down to the ground plane, so leaning wheels stand on their lower edge.
+//! The wheel is a torus of outer radius `R0` whose tread has the crown radius `r_c` across: a thin
+//! disc for `r_c = 0`, which stands on its lower edge when it leans. The contact point is the torus's
+//! lowest one, so a lean by `γ` moves it sideways by about `(R0 − r_c) sin γ`; the lateral force moves
+//! it further by the tyre's compliance. Twin tyres are two such wheels that share spin and slip.
 
 use nalgebra::Vector3;
 
@@ -28,6 +30,8 @@ pub struct Wheel {
     pub radial: RadialSpring,
     /// Unloaded radius, m.
     pub radius_m: f64,
+    /// Radius of the tread across the wheel, m; 0 is a thin disc.
+    pub crown_radius_m: f64,
     /// Half the distance between the middles of twin tyres, m; 0 for a single tyre. Stiffness,
     /// damping and force law are those of both together.
     pub half_twin_spacing_m: f64,
@@ -158,9 +162,11 @@ impl Wheel {
         let forward = forward * inverse_cos;
         let left = normal.cross(&forward);
 
-        let distance = motion.height_m * inverse_cos;
-        let arm = (motion.axis * sin_camber - normal) * (inverse_cos * distance);
-        let deflection = self.radius_m - distance;
+        // A round tread is a thin disc, smaller by its radius, on a ground higher by its radius.
+        let distance = (motion.height_m - self.crown_radius_m) * inverse_cos;
+        let arm = (motion.axis * sin_camber - normal) * (inverse_cos * distance)
+            - normal * self.crown_radius_m;
+        let deflection = (self.radius_m - self.crown_radius_m) - distance;
         let contact_velocity = motion.velocity_m_s + motion.angular_rad_s.cross(&arm);
         // Rise of the contact point along the normal per lean of the wheel.
         let rise_per_lean = arm.cross(&normal).dot(&motion.turn_per_lean);

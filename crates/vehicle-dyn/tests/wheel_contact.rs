@@ -30,6 +30,7 @@ fn wheel() -> Wheel {
             damping_n_s_per_m: 0.0,
         },
         radius_m: 0.344,
+        crown_radius_m: 0.0,
         half_twin_spacing_m: 0.0,
         lateral_compliance_m_per_n: 0.0,
         camber_thrust_ratio: 0.05,

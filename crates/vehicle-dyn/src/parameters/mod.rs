@@ -143,6 +143,10 @@ pub struct TyreParameters {
     /// Distance between the middles of twin tyres on one rear wheel, m; 0 is a single tyre.
     /// Stiffness, damping and the force law are those of both tyres together.
     pub twin_spacing_rear_m: f64,
+    /// Radius of the tread across the wheel, m: 0 is a thin disc, which stands on its edge when it
+    /// leans; at `unloaded_radius_m` the contact stays under the wheel centre. Car tyres are nearer
+    /// to the latter.
+    pub crown_radius_m: f64,
     /// Sideways motion of the contact patch against the wheel per lateral force of one wheel, m/N;
     /// 0 is rigid. It narrows the stand of a cornering vehicle.
     pub lateral_compliance_m_per_n: f64,

@@ -90,6 +90,7 @@ impl Dynamics {
                 damping_n_s_per_m: tyre.vertical_damping_n_s_per_m,
             },
             radius_m: tyre.unloaded_radius_m,
+            crown_radius_m: tyre.crown_radius_m,
             half_twin_spacing_m: if axle == 0 {
                 0.0
             } else {

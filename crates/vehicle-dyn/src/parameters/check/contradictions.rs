@@ -40,6 +40,45 @@ pub(super) fn check(vehicle: &VehicleParameters, origin: &str) -> Result<(), Par
         "no body has these inertias: none may exceed the sum of the other two (is one of them for \
          the whole vehicle, or for another axis?)",
     )?;
+    let tyre = &vehicle.tyre;
+    require(
+        tyre.crown_radius_m <= tyre.unloaded_radius_m,
+        format!(
+            "tyre.crown_radius_m = {} with tyre.unloaded_radius_m = {}",
+            tyre.crown_radius_m, tyre.unloaded_radius_m
+        ),
+        "the tread's radius across the wheel must not exceed the radius of the wheel",
+    )?;
+    let track_rear = vehicle.geometry.track_rear_m;
+    require(
+        tyre.twin_spacing_rear_m < track_rear,
+        format!(
+            "tyre.twin_spacing_rear_m = {} with geometry.track_rear_m = {track_rear}",
+            tyre.twin_spacing_rear_m
+        ),
+        "the inner tyres of left and right would overlap",
+    )?;
+    let suspension = &vehicle.suspension;
+    for (axle, solid, gain) in [
+        (
+            "front",
+            &suspension.solid_axle_front,
+            suspension.camber_gain_front_rad_per_m,
+        ),
+        (
+            "rear",
+            &suspension.solid_axle_rear,
+            suspension.camber_gain_rear_rad_per_m,
+        ),
+    ] {
+        require(
+            solid.is_none() || gain == 0.0,
+            format!(
+                "suspension.camber_gain_{axle}_rad_per_m = {gain} with suspension.solid_axle_{axle}"
+            ),
+            "the wheels of a solid axle lean with the axle: give 0",
+        )?;
+    }
     let limit = steering.handwheel_limit_deg;
     require(
         limit / steering.ratio <= LARGEST_ROAD_WHEEL_DEG,

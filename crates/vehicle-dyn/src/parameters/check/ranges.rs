@@ -266,7 +266,7 @@ fn solid_axle_rows(v: &SolidAxleParameters) -> [Row<'_>; 2] {
     ]
 }
 
-fn tyre_rows(vehicle: &VehicleParameters) -> [Row<'_>; 17] {
+fn tyre_rows(vehicle: &VehicleParameters) -> [Row<'_>; 18] {
     let v = &vehicle.tyre;
     let radial = within(1e4, 1e8);
     let (radial_front, radial_rear) = (
@@ -305,6 +305,7 @@ fn tyre_rows(vehicle: &VehicleParameters) -> [Row<'_>; 17] {
             within(0.0, 1.0),
             "m",
         ),
+        ("crown_radius_m", v.crown_radius_m, within(0.0, 2.0), "m"),
         (
             "lateral_compliance_m_per_n",
             v.lateral_compliance_m_per_n,
