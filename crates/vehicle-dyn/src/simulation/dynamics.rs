@@ -8,7 +8,7 @@ use crate::chassis::{HubLoad, SprungBody, sum_corners};
 use crate::parameters::VehicleParameters;
 use crate::powertrain::Powertrain;
 use crate::steering::SteeringActuator;
-use crate::suspension::{AxleSuspension, Guidance};
+use crate::suspension::{AxleSuspension, Guidance, Pair};
 use crate::terrain::Terrain;
 use crate::tyre::{MagicFormula, RadialSpring};
 use crate::units::GRAVITY_M_S2;
@@ -51,6 +51,50 @@ pub(crate) struct Dynamics {
     pub drag_kg_per_m: f64,
     pub total_mass_kg: f64,
     pub gravity_m_s2: Vector3<f64>,
+}
+
+/// What all four wheels share at an instant.
+struct Frame {
+    /// Body to world.
+    rotation: Matrix3<f64>,
+    /// World to body.
+    to_body: Matrix3<f64>,
+    /// Velocity of the sprung CG in body axes, m/s.
+    velocity_m_s: Vector3<f64>,
+    /// Sine and cosine of the front wheels' angle.
+    steer: [f64; 2],
+    /// Rate of that angle, rad/s.
+    steer_rate_rad_s: f64,
+}
+
+/// How the links move the two wheels of an axle.
+struct AxleMotion {
+    /// Tangents of the leans.
+    lean: Pair,
+    lean_rate_per_s: Pair,
+    scrub_m_s: Pair,
+}
+
+impl AxleMotion {
+    #[inline]
+    fn new(suspension: &AxleSuspension, state: &State, axle: usize) -> Self {
+        let pair = |of: &[f64; 4]| [of[2 * axle], of[2 * axle + 1]];
+        let (travel, rate) = (pair(&state.travel_m), pair(&state.travel_rate_m_s));
+        Self {
+            lean: suspension.guidance.lean(travel),
+            lean_rate_per_s: suspension.guidance.lean(rate),
+            scrub_m_s: suspension.guidance.scrub_m_s(rate),
+        }
+    }
+}
+
+/// One wheel in body axes.
+struct Corner {
+    hub_m: Vector3<f64>,
+    /// Spin axis, pointing left, and its rate, 1/s.
+    axis: Vector3<f64>,
+    axis_rate: Vector3<f64>,
+    contact: Contact,
 }
 
 impl Dynamics {
@@ -160,71 +204,39 @@ impl Dynamics {
         terrain: &Terrain,
     ) -> (StateRate, [Contact; 4]) {
         let rotation = state.rotation();
-        let to_body = rotation.transpose();
-        let omega = state.angular_rad_s;
-        let velocity = to_body * state.velocity_m_s;
-        let steer: [f64; 2] = self
-            .steering
-            .road_wheel_rad(state.steering[0])
-            .sin_cos()
-            .into();
         let steering_rates = self.steering.rates(state.steering, input.handwheel_rad);
-        let steer_rate = self.steering.road_wheel_rad(steering_rates[0]);
-
-        let (travel, rate) = (&state.travel_m, &state.travel_rate_m_s);
-        let guided = [0, 1].map(|axle| {
-            let guidance = &self.axles[axle].guidance;
-            let pair = |of: &[f64; 4]| [of[2 * axle], of[2 * axle + 1]];
-            let (lean, lean_rate) = (guidance.lean(pair(travel)), guidance.lean(pair(rate)));
-            (lean, lean_rate, guidance.scrub_m_s(pair(rate)))
-        });
-        let mut contacts = [Contact::default(); 4];
-        let mut hubs_m = [Vector3::zeros(); 4];
-        let mut axes = [Vector3::zeros(); 4];
-        let mut axis_rates = [Vector3::zeros(); 4];
-        for i in 0..4 {
-            let wheel = &self.wheels[i];
-            let mut hub = self.hub_m[i];
-            hub.z += state.travel_m[i];
-            let (wheel_steer, wheel_steer_rate) = if i < 2 {
-                (steer, steer_rate)
-            } else {
-                ([0.0, 1.0], 0.0)
-            };
-            let (leans, lean_rates, scrubs) = &guided[i / 2];
-            let [axis, by_steer, by_lean] = spin_axis(wheel_steer, leans[i % 2]);
-            let lean_rate = lean_rates[i % 2];
-            let mut hub_velocity = velocity + omega.cross(&hub);
-            hub_velocity.z += state.travel_rate_m_s[i];
-
-            let world = state.position_m + rotation * hub;
-            let ground = terrain.ground(world.x, world.y);
-            let normal = ground.normal();
-            contacts[i] = wheel.contact(
-                &WheelMotion {
-                    axis,
-                    velocity_m_s: hub_velocity,
-                    angular_rad_s: omega,
-                    lean_rate_per_s: lean_rate,
-                    turn_per_lean: axis.cross(&by_lean),
-                    scrub_m_s: scrubs[i % 2],
-                    height_m: (world.z - ground.height_m) * normal.z,
-                    normal: to_body * normal,
-                    spin_rad_s: state.spin_rad_s[i],
-                    slip: state.slip[i],
-                },
-                &ground,
-            );
-            hubs_m[i] = hub;
-            axes[i] = axis;
-            axis_rates[i] = omega.cross(&axis) + by_steer * wheel_steer_rate + by_lean * lean_rate;
-        }
+        let frame = Frame {
+            rotation,
+            to_body: rotation.transpose(),
+            velocity_m_s: rotation.transpose() * state.velocity_m_s,
+            steer: self
+                .steering
+                .road_wheel_rad(state.steering[0])
+                .sin_cos()
+                .into(),
+            steer_rate_rad_s: self.steering.road_wheel_rad(steering_rates[0]),
+        };
+        let omega = state.angular_rad_s;
+        let [front, rear] = [0, 1].map(|axle| AxleMotion::new(&self.axles[axle], state, axle));
+        let corner = |i: usize, axle: &AxleMotion| self.corner(i, state, &frame, axle, terrain);
+        let corners = [
+            corner(0, &front),
+            corner(1, &front),
+            corner(2, &rear),
+            corner(3, &rear),
+        ];
+        let contacts = [
+            corners[0].contact,
+            corners[1].contact,
+            corners[2].contact,
+            corners[3].contact,
+        ];
 
         let spin_rates = self.spin_rates(state, &contacts);
         let struts = self.struts(state, &contacts);
         let hub_load = |i: usize| HubLoad {
             mass_kg: self.unsprung_kg[i],
-            position_m: hubs_m[i],
+            position_m: corners[i].hub_m,
             rate_m_s: state.travel_rate_m_s[i],
             contact_force_n: contacts[i].force_n,
             contact_moment_nm: contacts[i].moment_nm,
@@ -234,7 +246,7 @@ impl Dynamics {
         // What changes the wheels' angular momentum is taken from the body: torques between the
         // two are internal.
         let spin_moment = |i: usize| {
-            (axes[i] * spin_rates[i] + axis_rates[i] * state.spin_rad_s[i])
+            (corners[i].axis * spin_rates[i] + corners[i].axis_rate * state.spin_rad_s[i])
                 * -self.wheels[i].gyroscopic_inertia
         };
         let spin_moments = [
@@ -243,8 +255,8 @@ impl Dynamics {
             spin_moment(2),
             spin_moment(3),
         ];
-        let drag = velocity * (-self.drag_kg_per_m * velocity.norm());
-        let gravity = to_body * self.gravity_m_s2;
+        let drag = frame.velocity_m_s * (-self.drag_kg_per_m * frame.velocity_m_s.norm());
+        let gravity = frame.to_body * self.gravity_m_s2;
         let acceleration =
             self.body
                 .accelerate(omega, gravity, &hubs, drag, sum_corners(&spin_moments));
@@ -270,6 +282,52 @@ impl Dynamics {
                 .rates(&state.powertrain, forward_speed, input.longitudinal),
         };
         (rate, contacts)
+    }
+
+    /// Motion of wheel `i` and what the ground does to it.
+    #[inline]
+    fn corner(
+        &self,
+        i: usize,
+        state: &State,
+        frame: &Frame,
+        axle: &AxleMotion,
+        terrain: &Terrain,
+    ) -> Corner {
+        let omega = state.angular_rad_s;
+        let mut hub = self.hub_m[i];
+        hub.z += state.travel_m[i];
+        let (steer, steer_rate) = if i < 2 {
+            (frame.steer, frame.steer_rate_rad_s)
+        } else {
+            ([0.0, 1.0], 0.0)
+        };
+        let [axis, by_steer, by_lean] = spin_axis(steer, axle.lean[i % 2]);
+        let lean_rate = axle.lean_rate_per_s[i % 2];
+        let mut hub_velocity = frame.velocity_m_s + omega.cross(&hub);
+        hub_velocity.z += state.travel_rate_m_s[i];
+
+        let world = state.position_m + frame.rotation * hub;
+        let ground = terrain.ground(world.x, world.y);
+        let normal = ground.normal();
+        let motion = WheelMotion {
+            axis,
+            velocity_m_s: hub_velocity,
+            angular_rad_s: omega,
+            lean_rate_per_s: lean_rate,
+            turn_per_lean: axis.cross(&by_lean),
+            scrub_m_s: axle.scrub_m_s[i % 2],
+            height_m: (world.z - ground.height_m) * normal.z,
+            normal: frame.to_body * normal,
+            spin_rad_s: state.spin_rad_s[i],
+            slip: state.slip[i],
+        };
+        Corner {
+            hub_m: hub,
+            axis,
+            axis_rate: omega.cross(&axis) + by_steer * steer_rate + by_lean * lean_rate,
+            contact: self.wheels[i].contact(&motion, &ground),
+        }
     }
 
     fn spin_rates(&self, state: &State, contacts: &[Contact; 4]) -> [f64; 4] {
