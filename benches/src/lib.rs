@@ -11,3 +11,4 @@ pub mod plant;
 pub mod reference;
 pub mod replay;
 pub mod synthetic;
+pub mod validation;

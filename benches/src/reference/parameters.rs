@@ -15,7 +15,7 @@ use vehicle_dyn::parameters::{
 };
 use vehicle_dyn::units::GRAVITY_M_S2;
 
-/// Parameters of the CommonRoad multi-body model, by its own names (SI units; its axes are y to the
+/// Parameters of the `CommonRoad` multi-body model, by its own names (SI units; its axes are y to the
 /// right and z down). What the conversion does not need is not read.
 #[allow(non_snake_case, reason = "names of the reference")]
 #[derive(Debug, Clone, Deserialize)]
@@ -53,6 +53,7 @@ pub struct ReferenceParameters {
 }
 
 /// The lateral coefficients of the reference's tyre that the conversion needs.
+#[allow(clippy::struct_field_names, reason = "names of the reference")]
 #[derive(Debug, Clone, Deserialize)]
 struct ReferenceTyre {
     p_cy1: f64,
