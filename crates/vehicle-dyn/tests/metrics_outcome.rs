@@ -49,6 +49,26 @@ fn a_vehicle_that_rolls_on_stays_rolled_over() {
 }
 
 #[test]
+fn a_vehicle_on_its_nose_counts_as_rolled_over_past_the_vertical() {
+    let mut simulation = on_flat(&sedan(), 0.85, 50.0);
+    let mut judged = |pitch_deg: f64| {
+        let mut state = *simulation.state();
+        state.set_angles(0.0, pitch_deg * DEGREE, 0.0);
+        simulation.set_state(state).expect("finite");
+        let mut monitor = OutcomeMonitor::new(WIDTH_M);
+        let seen = simulation.observation();
+        let upright = Observation {
+            sideslip_rad: 0.0,
+            ..seen
+        };
+        monitor.observe(&upright, 0.0);
+        monitor.outcome()
+    };
+    assert_eq!(judged(80.0), Outcome::Completed);
+    assert_eq!(judged(100.0), Outcome::RolledOver);
+}
+
+#[test]
 fn sliding_backwards_is_a_spin_and_standing_still_is_none() {
     let mut monitor = OutcomeMonitor::new(WIDTH_M);
     let standing = at(1.0, |o| {

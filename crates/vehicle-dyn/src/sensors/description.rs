@@ -21,8 +21,8 @@ pub struct SensorDescription {
     pub quantisation: f64,
     /// Share of the samples that are lost in the long run, in [0, 1] (no unit).
     pub drop_out_probability: f64,
-    /// Mean length of a drop-out, s, at least one sample; absent: each sample is lost independently
-    /// of the others.
+    /// Mean length of a drop-out, s, at least one sample: a chain of two states (Gilbert 1960). Absent:
+    /// each sample is lost independently of the others.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub drop_out_mean_length_s: Option<f64>,
     /// What a lost sample reads.
