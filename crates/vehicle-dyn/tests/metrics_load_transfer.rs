@@ -7,10 +7,11 @@ use vehicle_dyn::metrics::{LoadTransferIndex, QuasiStaticTransfer, two_wheel_cle
 use vehicle_dyn::parameters::{SolidAxleParameters, VehicleParameters};
 use vehicle_dyn::simulation::{Command, Observation};
 
-/// Share of the load transfer ratio by which the index may miss it in steady cornering before lift-off.
-const STEADY_TOLERANCE: f64 = 0.03;
-/// The same for the index of roll angle and rate alone.
-const STEADY_TOLERANCE_OF_ROLL: f64 = 0.05;
+/// Share of the load transfer ratio by which both forms of the index may miss it in steady cornering up
+/// to |LTR| = 0.85.
+const STEADY_TOLERANCE: f64 = 0.01;
+/// The same between there and lift-off.
+const LAST_TOLERANCE: f64 = 0.04;
 
 /// Cornering at a held handwheel until all is steady.
 fn steady(vehicle: &VehicleParameters, handwheel_deg: f64, speed_kmh: f64) -> Observation {
@@ -40,28 +41,33 @@ fn quasi_static(vehicle: &VehicleParameters, seen: &Observation) -> f64 {
 
 fn assert_steady(vehicle: &VehicleParameters, handwheel_deg: f64, speed_kmh: f64) {
     let seen = steady(vehicle, handwheel_deg, speed_kmh);
-    let found = index(vehicle, &seen);
-    let of_roll = index_of_roll(vehicle, &seen);
-    assert!(
-        seen.ltr.abs() > 0.05 && seen.ltr.abs() < 0.85,
-        "not in the linear range: {}",
-        seen.ltr
-    );
-    assert!(
-        (found - seen.ltr).abs() < STEADY_TOLERANCE * seen.ltr.abs(),
-        "index {found} at LTR {}",
-        seen.ltr
-    );
-    assert!(
-        (of_roll - seen.ltr).abs() < STEADY_TOLERANCE_OF_ROLL * seen.ltr.abs(),
-        "index of roll {of_roll} at LTR {}",
-        seen.ltr
-    );
+    let largest = seen.ltr.abs();
+    assert!((0.05..0.95).contains(&largest), "{largest}");
+    let share = if largest < 0.85 {
+        STEADY_TOLERANCE
+    } else {
+        LAST_TOLERANCE
+    };
+    for found in [index(vehicle, &seen), index_of_roll(vehicle, &seen)] {
+        assert!(
+            (found - seen.ltr).abs() < share * largest,
+            "index {found} at LTR {}",
+            seen.ltr
+        );
+    }
 }
 
 #[test]
 fn the_index_equals_the_load_transfer_ratio_in_steady_cornering() {
-    for (handwheel_deg, speed_kmh) in [(8.0, 60.0), (-20.0, 70.0), (25.0, 80.0), (12.0, 100.0)] {
+    for (handwheel_deg, speed_kmh) in [
+        (8.0, 60.0),
+        (-20.0, 70.0),
+        (25.0, 80.0),
+        (12.0, 100.0),
+        (-38.0, 85.0),
+        (50.0, 85.0),
+        (55.0, 85.0),
+    ] {
         assert_steady(&sedan(), handwheel_deg, speed_kmh);
     }
 }
@@ -107,9 +113,9 @@ fn the_index_follows_the_ratio_in_a_step_steer() {
         errors.fold(0.0, f64::max)
     };
     let largest = seen.iter().map(|o| o.ltr.abs()).fold(0.0, f64::max);
-    // It misses the ratio by the unsprung masses' inertia, the quasi-static formula by the roll.
-    assert!(worst(index) < 0.03, "{}", worst(index));
-    assert!(worst(index_of_roll) < 0.03, "{}", worst(index_of_roll));
+    // The index misses the ratio by the unsprung masses' inertia, the quasi-static formula by the roll.
+    assert!(worst(index) < 0.025, "{}", worst(index));
+    assert!(worst(index_of_roll) < 0.025, "{}", worst(index_of_roll));
     assert!(worst(quasi_static) > 0.1, "{}", worst(quasi_static));
     assert!((0.4..0.85).contains(&largest), "{largest}");
 }
@@ -134,10 +140,11 @@ fn the_index_goes_on_where_wheels_lift() {
     assert!((at_lift - 1.0).abs() < 0.1, "{at_lift}");
     let last = seen.last().expect("not empty");
     assert!(last.roll_rad > 1.0, "rolls over: {last:?}");
+    // Near 45° the tyres lose their lateral force, and the index a part of its own.
     // The loads' ratio falls again, that of the sum stands still, and the index tells how far it is.
     let tipping: Vec<f64> = seen
         .iter()
-        .filter(|o| o.roll_rad > 0.2)
+        .filter(|o| (0.2..0.75).contains(&o.roll_rad))
         .map(|o| index(&vehicle, o))
         .collect();
     assert!(tipping[0] > 1.3 && tipping.is_sorted());

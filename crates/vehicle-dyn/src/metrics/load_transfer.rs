@@ -68,22 +68,26 @@ impl QuasiStaticTransfer {
 /// a share `s = K_t/(K + K_t)` remains:
 ///
 /// ```text
-/// index = Σ_axles 2 s (K φ + C φ̇ + h_rc m_axle a_y)/(T m g)
-/// K = 2 k (b/2)² + K_antiroll,   C = (c_bump + c_rebound) (d/2)²
+/// index = (1 + φ a_y/g) Σ_axles 2 s ((K + K_γ) φ + C φ̇ + h_rc m_axle a_y)/(T m g)
+/// K   = 2 k (b/2)² + K_antiroll,   C = (c_bump + c_rebound) (d/2)²
+/// K_γ = (T/2) m_axle g R γ' (1 − s γ' T/2)
 /// ```
 ///
 /// `b` and `d` are the distances between springs and between dampers: the track for independent
 /// wheels, less on a solid axle. `K_antiroll` may be negative. In roll one side is in bump and
-/// the other in rebound, so both dampings add up. `F_y = m_axle a_y` with the mass that stands on the axle.
+/// the other in rebound, so both dampings add up. `F_y = m_axle a_y` with the mass that stands on
+/// the axle. `K_γ` comes from wheels of loaded radius `R` that lean by `γ'` per travel: their
+/// contacts move sideways, and the load turns them on. The factor in front is the part of the lateral
+/// forces along the struts of a leaning body; the outer wheels have more of it.
 ///
 /// This is the `LTR_d` of Solmaz, Corless, Shorten 2007, `2 (k φ + c φ̇)/(m g T)`, for two axles
-/// with roll centres and tyres. It equals the load transfer ratio while springs, dampers and tyres are
-/// linear (before stops and lift-off) and grows with the roll angle beyond lift-off, where the
+/// with roll centres and tyres. It follows the load transfer ratio up to lift-off, as long as no
+/// stop is in contact, and grows with the roll angle beyond, where the
 /// loads cannot tell any more how far the vehicle has tipped. Left out: inertia of the unsprung
-/// masses, the sideways shift of cambered contacts, stops, twin tyres on a wheel.
+/// masses, stops, twin tyres on a wheel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LoadTransferIndex {
-    /// Index per roll angle, 1/rad.
+    /// Index per roll angle without the leading factor, 1/rad; so are the next two.
     pub per_roll_rad: f64,
     /// Index per roll rate, s/rad.
     pub per_roll_rate_rad_s: f64,
@@ -91,6 +95,9 @@ pub struct LoadTransferIndex {
     pub per_lateral_acceleration_m_s2: f64,
     /// Roll angle per lateral acceleration in steady cornering, rad s²/m.
     pub roll_gradient_rad_per_m_s2: f64,
+    /// Lateral acceleration at which a rigid vehicle lifts off, m/s²: `g` times the static stability
+    /// factor.
+    pub rigid_lift_off_m_s2: f64,
 }
 
 impl LoadTransferIndex {
@@ -116,6 +123,7 @@ impl LoadTransferIndex {
             per_roll_rate_rad_s: sum(Axle::roll_damping),
             per_lateral_acceleration_m_s2: sum(Axle::link_moment),
             roll_gradient_rad_per_m_s2: overturning / (carried - weight_n * shift_m_per_rad),
+            rigid_lift_off_m_s2: figures.static_stability_factor * GRAVITY_M_S2,
         }
     }
 
@@ -131,18 +139,21 @@ impl LoadTransferIndex {
         roll_rate_rad_s: f64,
         lateral_acceleration_m_s2: f64,
     ) -> f64 {
-        self.per_roll_rad * roll_rad
+        let carried = self.per_roll_rad * roll_rad
             + self.per_roll_rate_rad_s * roll_rate_rad_s
-            + self.per_lateral_acceleration_m_s2 * lateral_acceleration_m_s2
+            + self.per_lateral_acceleration_m_s2 * lateral_acceleration_m_s2;
+        carried * (1.0 + roll_rad * lateral_acceleration_m_s2 / GRAVITY_M_S2)
     }
 
-    /// The index from roll angle and rate alone: the links' part is that of steady cornering at
-    /// this roll angle. For vehicles without an accelerometer; worse in fast manoeuvres, where the
-    /// roll angle follows the acceleration late.
+    /// The index from roll angle and rate alone: the lateral acceleration is taken to be that of
+    /// steady cornering at this roll angle, but no more than lifts a rigid vehicle off. For vehicles
+    /// without an accelerometer; worse in fast manoeuvres, where the roll angle follows the
+    /// acceleration late.
     #[must_use]
     pub fn index_of_roll(&self, roll_rad: f64, roll_rate_rad_s: f64) -> f64 {
-        let acceleration = roll_rad / self.roll_gradient_rad_per_m_s2;
-        self.index(roll_rad, roll_rate_rad_s, acceleration)
+        let steady = roll_rad / self.roll_gradient_rad_per_m_s2;
+        let most = self.rigid_lift_off_m_s2;
+        self.index(roll_rad, roll_rate_rad_s, steady.clamp(-most, most))
     }
 }
 
@@ -156,8 +167,9 @@ struct Axle {
     damping_nm_s_per_rad: f64,
     roll_centre_m: f64,
     load_n: f64,
-    /// Shift of the contacts under the hubs per roll against the axle, m/rad.
-    camber_shift_m_per_rad: f64,
+    loaded_radius_m: f64,
+    /// Lean of the wheels per roll against the axle (no unit).
+    lean_per_roll: f64,
 }
 
 impl Axle {
@@ -215,7 +227,8 @@ impl Axle {
             damping_nm_s_per_rad: 0.25 * both_dampings_n_s_per_m * dampers_m * dampers_m,
             roll_centre_m,
             load_n: 2.0 * wheel_load_n,
-            camber_shift_m_per_rad: loaded_radius_m * camber_gain_rad_per_m * 0.5 * track_m,
+            loaded_radius_m,
+            lean_per_roll: camber_gain_rad_per_m * 0.5 * track_m,
         }
     }
 
@@ -225,7 +238,13 @@ impl Axle {
     }
 
     fn roll_stiffness(&self) -> f64 {
-        self.share() * self.suspension_nm_per_rad
+        self.share() * (self.suspension_nm_per_rad + self.camber_stiffness())
+    }
+
+    /// `K_γ`, N m/rad.
+    fn camber_stiffness(&self) -> f64 {
+        let against_ground = 1.0 - self.share() * self.lean_per_roll;
+        self.load_n * self.loaded_radius_m * self.lean_per_roll * against_ground
     }
 
     fn roll_damping(&self) -> f64 {
@@ -237,8 +256,8 @@ impl Axle {
         self.share() * self.roll_centre_m * self.load_n / GRAVITY_M_S2
     }
 
-    /// Load times the shift of its contacts, N m/rad.
+    /// Load times the shift of its contacts under the hubs, N m/rad.
     fn contact_shift(&self) -> f64 {
-        self.share() * self.load_n * self.camber_shift_m_per_rad
+        self.share() * self.load_n * self.loaded_radius_m * self.lean_per_roll
     }
 }
