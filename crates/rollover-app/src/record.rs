@@ -36,7 +36,9 @@ pub struct RecordingSummary {
     pub seed: u64,
     /// Samples recorded.
     pub samples: usize,
-    /// Largest |LTR|: above 1 wheels lifted, and data beyond lift-off mislead a linear predictor.
+    /// Samples of the LTR that the sensor lost; lines between their neighbours stand for them.
+    pub ltr_filled_samples: usize,
+    /// Largest true |LTR|: above 1 wheels lifted, and data beyond lift-off mislead a linear predictor.
     pub ltr_abs_max: f64,
     /// Largest distance from the centre line, m.
     pub path_deviation_max_m: f64,
@@ -53,13 +55,20 @@ pub fn record(
     interrupt: &Interrupt,
 ) -> Result<(Dataset, RecordingSummary)> {
     let recipe = &scenario.recording;
-    let mut plant = DrivenVehicle::new(scenario, vehicle, &recipe.course, recipe.target_speed_kmh)?;
+    let mut plant = DrivenVehicle::new(
+        scenario,
+        vehicle,
+        &recipe.course,
+        recipe.target_speed_kmh,
+        (seed, "recording"),
+    )?;
     let mut noise = ChaCha8Rng::seed_from_u64(seed);
     let steering_noise = normal(recipe.steering_wheel_noise_deg)?;
     let speed_noise = normal(recipe.target_speed_noise_kmh)?;
     let samples = scenario.recording_samples();
     let mut inputs: Vec<[f64; INPUTS]> = Vec::with_capacity(samples);
-    let mut outputs: Vec<[f64; OUTPUTS]> = Vec::with_capacity(samples);
+    let mut measured: Vec<f64> = Vec::with_capacity(samples);
+    let mut ltr_abs_max = 0.0_f64;
     let mut deviation_m = 0.0_f64;
     for _ in 0..samples {
         interrupt.check("while recording", "no recording was written")?;
@@ -70,7 +79,8 @@ pub fn record(
         let mut output = [0.0];
         plant.step(&input, &mut output)?;
         inputs.push(input);
-        outputs.push(output);
+        measured.push(plant.measured_ltr());
+        ltr_abs_max = ltr_abs_max.max(output[0].abs());
         deviation_m = deviation_m.max(plant.location().lateral_offset_m.abs());
         anyhow::ensure!(
             plant.outcome() == Outcome::Completed,
@@ -84,18 +94,38 @@ pub fn record(
         vehicle: vehicle.name.clone(),
         seed,
         samples,
-        ltr_abs_max: outputs
-            .iter()
-            .flatten()
-            .fold(0.0, |max: f64, y| max.max(y.abs())),
+        ltr_filled_samples: fill_gaps(&mut measured)
+            .context("the LTR sensor lost every sample of the recording: lower its drop-outs")?,
+        ltr_abs_max,
         path_deviation_max_m: deviation_m,
     };
     let mut dataset = Dataset::new(scenario.sample_time_s, INPUT_COLUMNS, OUTPUT_COLUMNS)?;
     dataset.push_record(
         Mat::from_fn(samples, INPUTS, |k, i| inputs[k][i]),
-        Mat::from_fn(samples, OUTPUTS, |k, i| outputs[k][i]),
+        Mat::from_fn(samples, OUTPUTS, |k, _| measured[k]),
     )?;
     Ok((dataset, summary))
+}
+
+/// Fills what is not finite by straight lines between the values around it, and before the first
+/// and after the last by these. Returns how many were filled, or `None` if there is no value at all.
+fn fill_gaps(values: &mut [f64]) -> Option<usize> {
+    let known: Vec<usize> = (0..values.len())
+        .filter(|&k| values[k].is_finite())
+        .collect();
+    let (&first, &last) = (known.first()?, known.last()?);
+    let (at_first, at_last) = (values[first], values[last]);
+    values[..first].fill(at_first);
+    values[last + 1..].fill(at_last);
+    for pair in known.windows(2) {
+        let (from, to) = (pair[0], pair[1]);
+        let (start, rise) = (values[from], values[to] - values[from]);
+        let steps = (to - from) as f64;
+        for (step, value) in values[from..to].iter_mut().enumerate().skip(1) {
+            *value = start + rise * step as f64 / steps;
+        }
+    }
+    Some(values.len() - known.len())
 }
 
 fn normal(standard_deviation: f64) -> Result<Normal<f64>> {
@@ -129,4 +159,23 @@ pub fn read(path: &Path, scenario: &Scenario) -> Result<Dataset> {
         sample_time_s: scenario.sample_time_s,
     };
     Dataset::read_csv(&layout, &[path]).context("the recording cannot be used")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::fill_gaps;
+
+    #[test]
+    fn gaps_are_filled_by_lines() {
+        let nan = f64::NAN;
+        let mut values = [nan, 1.0, nan, nan, 4.0, 3.0, nan];
+        assert_eq!(fill_gaps(&mut values), Some(4));
+        for (found, expected) in values.iter().zip([1.0, 1.0, 2.0, 3.0, 4.0, 3.0, 3.0]) {
+            assert!((found - expected).abs() < 1e-12, "{values:?}");
+        }
+        assert_eq!(fill_gaps(&mut [nan, nan]), None);
+        let mut whole = [0.1, -0.0, 0.3];
+        assert_eq!(fill_gaps(&mut whole), Some(0));
+        assert_eq!(whole.map(f64::to_bits), [0.1, -0.0, 0.3].map(f64::to_bits));
+    }
 }

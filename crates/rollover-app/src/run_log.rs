@@ -25,8 +25,29 @@ pub struct LogRow {
     pub steering_wheel_reference_deg: f64,
     /// The speed reference, km/h.
     pub target_speed_reference_kmh: f64,
-    /// Load transfer ratio (paper eq. 2), dimensionless, positive in a left turn.
+    /// Load transfer ratio (paper eq. 2), dimensionless, positive in a left turn: the true one, where
+    /// the source knows it.
     pub ltr: f64,
+    /// What the controller was given of it: the sensor's reading; absent where the sample was
+    /// lost, and in logs that have no such column.
+    #[serde(default)]
+    pub ltr_measured: Option<f64>,
+    /// Load-transfer index from roll angle, roll rate and lateral acceleration, dimensionless; absent
+    /// where it is not known, as are the four below.
+    #[serde(default)]
+    pub load_transfer_index: Option<f64>,
+    /// Lateral acceleration at the centre of gravity, m/s², left positive.
+    #[serde(default)]
+    pub lateral_acceleration_m_s2: Option<f64>,
+    /// Yaw rate, deg/s, counter-clockwise positive.
+    #[serde(default)]
+    pub yaw_rate_deg_s: Option<f64>,
+    /// Roll rate of the body, deg/s, right side down positive.
+    #[serde(default)]
+    pub roll_rate_deg_s: Option<f64>,
+    /// Height of both wheels of one side off the ground, m; 0 while each side has one on it.
+    #[serde(default)]
+    pub two_wheel_clearance_m: Option<f64>,
     /// Vertical tyre load, front left, N.
     pub load_front_left_n: f64,
     /// Vertical tyre load, front right, N.

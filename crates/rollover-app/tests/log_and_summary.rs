@@ -14,6 +14,12 @@ fn row(step: u32) -> LogRow {
         steering_wheel_reference_deg: 10.0 + k / 3.0 + 3.0,
         target_speed_reference_kmh: 105.0,
         ltr: -0.9 - k / 200.0,
+        ltr_measured: (step != 3).then_some(-0.9 - k / 201.0),
+        load_transfer_index: Some(-0.9 - k / 190.0),
+        lateral_acceleration_m_s2: Some(-6.1),
+        yaw_rate_deg_s: Some(-12.3),
+        roll_rate_deg_s: Some(0.1),
+        two_wheel_clearance_m: Some(k / 1000.0),
         load_front_left_n: 3000.0 + 0.1,
         load_front_right_n: 3000.0,
         load_rear_left_n: 2900.0,
@@ -36,6 +42,18 @@ fn row(step: u32) -> LogRow {
     }
 }
 
+fn identity() -> RunIdentity {
+    RunIdentity {
+        scenario: "scenario".into(),
+        vehicle: "vehicle".into(),
+        controller: "controller".into(),
+        seed: 7,
+        recording: None,
+        speed_reference_kmh: 105.0,
+        model: None,
+    }
+}
+
 fn rows(count: u32) -> Vec<LogRow> {
     (1..=count).map(row).collect()
 }
@@ -50,6 +68,76 @@ fn a_log_reads_back_to_the_same_bits() {
     }
     writer.finish().expect("there is room");
     assert_eq!(read(&path).expect("the log is whole"), rows(123));
+}
+
+#[test]
+fn a_log_without_measured_values_stays_readable() {
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let path = folder.path().join("log.csv");
+    let mut writer = LogWriter::create(&path).expect("the folder can be written");
+    for row in rows(5) {
+        writer.append(&row).expect("there is room");
+    }
+    writer.finish().expect("there is room");
+    let text = std::fs::read_to_string(&path).expect("the log is readable");
+    let header: Vec<&str> = text.lines().next().expect("a header").split(',').collect();
+    let newer = [
+        "ltr_measured",
+        "load_transfer_index",
+        "lateral_acceleration_m_s2",
+        "yaw_rate_deg_s",
+        "roll_rate_deg_s",
+        "two_wheel_clearance_m",
+    ];
+    let older = |line: &str| -> String {
+        let cells = header.iter().zip(line.split(','));
+        let kept: Vec<&str> = cells
+            .filter(|(name, _)| !newer.contains(name))
+            .map(|(_, cell)| cell)
+            .collect();
+        kept.join(",") + "\n"
+    };
+    std::fs::write(&path, text.lines().map(older).collect::<String>()).expect("writable");
+    let read = read(&path).expect("an older log is a log");
+    assert_eq!(read.len(), 5);
+    assert_eq!(read[1].ltr.to_bits(), row(2).ltr.to_bits());
+    assert!(read.iter().all(|r| r.ltr_measured.is_none()));
+    let summary = Summary::of_log(identity(), Outcome::Completed, &read, None, 0.01);
+    assert_eq!(summary.ltr_lost_steps, 0);
+    assert_eq!(summary.measures.load_transfer_index_abs_max, None);
+    assert!((summary.measures.ltr_abs_max - 0.925).abs() < 1e-12);
+}
+
+#[test]
+fn a_summary_written_before_there_were_measures_stays_readable() {
+    let summary = Summary::of_log(identity(), Outcome::Completed, &rows(3), None, 0.01);
+    let mut json = serde_json::to_value(&summary).expect("a summary is JSON");
+    assert_eq!(
+        serde_json::from_value::<Summary>(json.clone()).expect("it reads back"),
+        summary
+    );
+    let fields = json.as_object_mut().expect("an object");
+    fields.remove("measures").expect("it has measures");
+    fields
+        .remove("ltr_lost_steps")
+        .expect("it counts lost samples");
+    let older = serde_json::from_value::<Summary>(json).expect("an older summary is one");
+    assert_eq!(older.ltr_lost_steps, 0);
+}
+
+#[test]
+fn a_summary_has_the_rollover_measures_of_its_log() {
+    let summary = Summary::of_log(identity(), Outcome::Completed, &rows(100), None, 0.01);
+    let found = summary.measures;
+    assert_eq!(summary.ltr_lost_steps, 1);
+    assert!((found.ltr_abs_max - 1.4).abs() < 1e-12);
+    assert_eq!(found.ltr_abs_max_time_s, Some(1.0));
+    // Only one right wheel carries nothing.
+    assert_eq!(found.two_wheel_lift_first_s, None);
+    assert_eq!(found.two_wheel_clearance_max_m, Some(0.1));
+    assert!((found.roll_abs_max_rad - (1.0_f64 / 3.0).to_radians()).abs() < 1e-12);
+    assert_eq!(found.time_to_lift_min_s, Some(0.0));
+    assert!((found.path_deviation_abs_max_m - 10.0).abs() < 1e-12);
 }
 
 #[test]
@@ -71,21 +159,12 @@ fn a_truncated_log_is_refused_with_its_name() {
 
 #[test]
 fn a_summary_counts_what_the_log_holds() {
-    let identity = RunIdentity {
-        scenario: "scenario".into(),
-        vehicle: "vehicle".into(),
-        controller: "controller".into(),
-        seed: 7,
-        recording: None,
-        speed_reference_kmh: 105.0,
-        model: None,
-    };
     let weights = InputWeights {
         steering_wheel_per_deg2: 2.0,
         target_speed_per_kmh2: 0.5,
     };
     let rows = rows(100);
-    let summary = Summary::of_log(identity, Outcome::LeftRoad, &rows, Some(&weights), 0.01);
+    let summary = Summary::of_log(identity(), Outcome::LeftRoad, &rows, Some(&weights), 0.01);
     assert_eq!(
         (summary.steps, summary.fallback_steps, summary.solver_steps),
         (100, 1, 99)
@@ -112,16 +191,7 @@ fn a_summary_counts_what_the_log_holds() {
 
 #[test]
 fn summary_json_has_the_fields_programs_rely_on() {
-    let identity = RunIdentity {
-        scenario: "s".into(),
-        vehicle: "v".into(),
-        controller: "c".into(),
-        seed: 1,
-        recording: None,
-        speed_reference_kmh: 105.0,
-        model: None,
-    };
-    let summary = Summary::of_log(identity, Outcome::RolledOver, &rows(3), None, 0.01);
+    let summary = Summary::of_log(identity(), Outcome::RolledOver, &rows(3), None, 0.01);
     let json = serde_json::to_value(&summary).expect("a summary is JSON");
     let fields = [
         "scenario",

@@ -42,6 +42,7 @@ fn drive(name: &str, seed: u64, speed_reference_kmh: f64) -> Finished {
         scenario: &scenario,
         vehicle: &vehicle,
         speed_reference_kmh,
+        seed,
         controller,
     };
     run(order, log, &Interrupt::default(), || ()).expect("the simulation runs")

@@ -80,6 +80,7 @@ impl Job<'_> {
             scenario: self.scenario,
             vehicle: self.vehicle,
             speed_reference_kmh: self.speed_reference_kmh,
+            seed: self.seed,
             controller,
         };
         let log = self.out.join("log.csv");

@@ -7,9 +7,9 @@ mod recorded;
 use std::path::Path;
 use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use deepc_core::controller::{Controller, Origin, Plant, Reference};
-use vehicle_dyn::metrics::Outcome;
+use vehicle_dyn::metrics::{Outcome, two_wheel_clearance_m};
 use vehicle_dyn::parameters::VehicleParameters;
 
 pub use build::{Built, controller};
@@ -28,6 +28,8 @@ pub struct Run<'a> {
     pub vehicle: &'a VehicleParameters,
     /// Speed at the start and reference afterwards, km/h.
     pub speed_reference_kmh: f64,
+    /// Seed of the sensors' random numbers.
+    pub seed: u64,
     /// The controller; `None` leaves the driver alone.
     pub controller: Option<Box<dyn Controller>>,
 }
@@ -56,6 +58,7 @@ pub fn run(
         run.vehicle,
         &run.scenario.course,
         run.speed_reference_kmh,
+        (run.seed, "run"),
     )?;
     let mut writer = LogWriter::create(log)?;
     let mut rows = Vec::with_capacity(run.scenario.steps());
@@ -75,14 +78,16 @@ pub fn run(
             writer.finish()?;
             return Err(error).with_context(|| {
                 format!(
-                    "the simulation failed; {} holds the {} steps before",
+                    "the run stopped after {:.2} s; {} holds the {} steps before",
+                    rows.len() as f64 * run.scenario.sample_time_s,
                     log.display(),
                     rows.len()
                 )
             });
         }
         if let Some(controller) = run.controller.as_deref_mut() {
-            controller.observe(&decision.input, &output);
+            // What is lost is not a number: the controller has a rule for it (decision 7).
+            controller.observe(&decision.input, &[plant.measured_ltr()]);
         }
         let row = log_row(rows.len() + 1, &plant, &wanted, &decision, output[0]);
         writer.append(&row)?;
@@ -90,6 +95,13 @@ pub fn run(
         progress();
     }
     writer.finish()?;
+    if let Some(time_s) = plant.not_finite_s() {
+        bail!(
+            "the vehicle's state is not finite at {time_s:.2} s; {} holds the {} steps up to there",
+            log.display(),
+            rows.len()
+        );
+    }
     Ok(Finished {
         outcome: plant.outcome(),
         rows,
@@ -167,6 +179,7 @@ fn log_row(
 ) -> LogRow {
     let seen = plant.observation();
     let [front_left, front_right, rear_left, rear_right] = seen.wheel_loads_n;
+    let measured = plant.measured_ltr();
     LogRow {
         // A multiple of the sample time that prints as one would write it.
         time_s: (step as f64 * plant.sample_time_s() * 1e9).round() / 1e9,
@@ -175,6 +188,12 @@ fn log_row(
         steering_wheel_reference_deg: wanted[0],
         target_speed_reference_kmh: wanted[1],
         ltr,
+        ltr_measured: measured.is_finite().then_some(measured),
+        load_transfer_index: Some(plant.load_transfer_index()),
+        lateral_acceleration_m_s2: Some(seen.lateral_acceleration_m_s2),
+        yaw_rate_deg_s: Some(seen.yaw_rate_rad_s.to_degrees()),
+        roll_rate_deg_s: Some(seen.roll_rate_rad_s.to_degrees()),
+        two_wheel_clearance_m: Some(two_wheel_clearance_m(&seen.wheel_clearance_m)),
         load_front_left_n: front_left,
         load_front_right_n: front_right,
         load_rear_left_n: rear_left,

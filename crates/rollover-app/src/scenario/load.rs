@@ -6,8 +6,11 @@ use sysid::SysidError;
 use sysid::lmpc::OffsetHandling;
 use thiserror::Error;
 use vehicle_dyn::road::Course;
+use vehicle_dyn::sensors::{Channel, Sensor, SensorError};
 
-use super::{ControllerSettings, ModelSettings, Prediction, Scenario};
+use super::{
+    CONTROLLER_CHANNEL, ControllerSettings, DRIVER_CHANNELS, ModelSettings, Prediction, Scenario,
+};
 use crate::record::INPUT_COLUMNS;
 
 /// Scenarios that travel with the binary.
@@ -211,6 +214,7 @@ impl Check<'_> {
             recording.duration_s,
             recording.target_speed_kmh,
         )?;
+        self.sensors(s)?;
         s.driver.check().map_err(|e| ScenarioError::Course {
             origin: self.origin.to_owned(),
             field: "driver",
@@ -219,6 +223,37 @@ impl Check<'_> {
         s.controllers
             .iter()
             .try_for_each(|(name, c)| self.controller(name, c))
+    }
+
+    fn sensors(&self, s: &Scenario) -> Result<(), ScenarioError> {
+        for (&channel, description) in &s.sensors {
+            if channel != CONTROLLER_CHANNEL && !DRIVER_CHANNELS.contains(&channel) {
+                let read = DRIVER_CHANNELS.map(Channel::name).join("`, `");
+                return Err(self.out_of_range(
+                    &format!("sensors.{channel}"),
+                    "a sensor".into(),
+                    &format!(
+                        "on a channel that is read: controllers read `{CONTROLLER_CHANNEL}`, the driver `{read}`"
+                    ),
+                ));
+            }
+            // The seed changes no range.
+            let built = Sensor::new(description, s.sample_time_s, 0, channel.name());
+            built.map_err(|error| match error {
+                SensorError::OutOfRange {
+                    channel,
+                    field,
+                    value,
+                    range,
+                } => self.out_of_range(
+                    &format!("sensors.{channel}.{field}"),
+                    value.to_string(),
+                    &range,
+                ),
+                other => self.out_of_range("sensors", other.to_string(), "as it says"),
+            })?;
+        }
+        Ok(())
     }
 
     fn controller(&self, name: &str, c: &ControllerSettings) -> Result<(), ScenarioError> {

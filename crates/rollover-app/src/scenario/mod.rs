@@ -4,9 +4,12 @@ mod controller_file;
 mod controllers;
 mod load;
 
+use std::collections::BTreeMap;
+
 use serde::Deserialize;
 use vehicle_dyn::driver::DriverParameters;
 use vehicle_dyn::road::CourseDescription;
+use vehicle_dyn::sensors::{Channel, SensorDescription};
 
 pub use controllers::{
     ControllerSettings, DataMatrix, DataSettings, LtrPenalty, ModelSettings, Prediction,
@@ -15,6 +18,17 @@ pub use load::{ScenarioError, embedded_names, load};
 
 /// Name of the controller that every scenario has: the driver alone.
 pub const DRIVER: &str = "driver";
+
+/// The channel that controllers are given.
+pub const CONTROLLER_CHANNEL: Channel = Channel::LoadTransferRatio;
+
+/// The channels by which the driver steers.
+pub const DRIVER_CHANNELS: [Channel; 4] = [
+    Channel::Speed,
+    Channel::Heading,
+    Channel::PositionX,
+    Channel::PositionY,
+];
 
 /// A scenario file.
 #[derive(Debug, Clone, Deserialize)]
@@ -34,6 +48,10 @@ pub struct Scenario {
     pub speed_reference_kmh: f64,
     /// The ground.
     pub ground: Ground,
+    /// Sensors by channel; a channel without one is measured perfectly. Controllers read `ltr`, the
+    /// driver [`DRIVER_CHANNELS`].
+    #[serde(default)]
+    pub sensors: BTreeMap<Channel, SensorDescription>,
     /// The driver, who steers in every run and is the reference of the controllers.
     pub driver: DriverParameters,
     /// The road to be driven.
@@ -43,7 +61,7 @@ pub struct Scenario {
     /// How the controllers' data are recorded.
     pub recording: RecordingRecipe,
     /// Controllers by name. [`DRIVER`] is always there and is not listed.
-    pub controllers: std::collections::BTreeMap<String, ControllerSettings>,
+    pub controllers: BTreeMap<String, ControllerSettings>,
 }
 
 /// The ground under the course.

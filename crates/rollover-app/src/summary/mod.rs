@@ -3,7 +3,7 @@
 mod model;
 
 use serde::{Deserialize, Serialize};
-use vehicle_dyn::metrics::Outcome;
+use vehicle_dyn::metrics::{Outcome, RunMeasures, RunSample};
 
 use crate::run_log::{LogRow, SolveStatus};
 pub use model::{EffectSummary, ModelSummary};
@@ -57,6 +57,12 @@ pub struct Summary {
     pub solver_steps: usize,
     /// Steps in which the solve failed and the controller fell back.
     pub fallback_steps: usize,
+    /// Steps whose measured LTR the sensor lost; 0 for logs without measured values.
+    #[serde(default)]
+    pub ltr_lost_steps: usize,
+    /// Rollover measures of the true motion, in SI units.
+    #[serde(default)]
+    pub measures: RunMeasures,
     /// Wall-clock time of a step, µs.
     pub step_time_us: StepTime,
     /// The identified model it predicts with, if it does.
@@ -158,9 +164,38 @@ impl Summary {
             unconstrained_steps: count(|s| s == SolveStatus::Unconstrained),
             solver_steps: count(|s| matches!(s, SolveStatus::Solved | SolveStatus::SolvedBySecond)),
             fallback_steps: count(SolveStatus::is_fallback),
+            ltr_lost_steps: lost_steps(rows),
+            measures: RunMeasures::of(sample_time_s, rows.iter().map(sample)),
             step_time_us: StepTime::of(rows.iter().map(|r| r.step_time_us)),
             model: identity.model,
         }
+    }
+}
+
+fn lost_steps(rows: &[LogRow]) -> usize {
+    let lost = rows.iter().filter(|r| r.ltr_measured.is_none()).count();
+    if lost == rows.len() && rows.iter().all(|r| r.load_transfer_index.is_none()) {
+        // An old log has no column of measured values.
+        return 0;
+    }
+    lost
+}
+
+fn sample(row: &LogRow) -> RunSample {
+    RunSample {
+        time_s: row.time_s,
+        ltr: row.ltr,
+        load_transfer_index: row.load_transfer_index,
+        wheel_loads_n: [
+            row.load_front_left_n,
+            row.load_front_right_n,
+            row.load_rear_left_n,
+            row.load_rear_right_n,
+        ],
+        two_wheel_clearance_m: row.two_wheel_clearance_m,
+        roll_rad: row.roll_deg.to_radians(),
+        sideslip_rad: row.sideslip_deg.to_radians(),
+        path_deviation_m: row.path_deviation_m,
     }
 }
 

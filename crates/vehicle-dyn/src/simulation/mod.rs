@@ -216,6 +216,12 @@ impl Simulation {
         self.substeps_done as f64 * self.substep_s
     }
 
+    /// The integration step, s.
+    #[must_use]
+    pub fn substep_s(&self) -> f64 {
+        self.substep_s
+    }
+
     /// The full state, for checks and for saving.
     #[must_use]
     pub fn state(&self) -> &State {

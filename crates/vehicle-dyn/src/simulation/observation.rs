@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use crate::metrics;
 use crate::units::{DEGREE, KMH};
 
 /// Measured state at one instant. Axes ISO 8855; wheels front left, front right, rear left, rear
@@ -43,6 +44,8 @@ pub struct Observation {
     pub road_wheel_rad: f64,
     /// Load of each wheel along the ground normal, N.
     pub wheel_loads_n: [f64; 4],
+    /// Radial gap between each tyre and the ground, m; 0 for a wheel that touches it.
+    pub wheel_clearance_m: [f64; 4],
     /// Wheel travel from the design height, bump positive, m.
     pub wheel_travel_m: [f64; 4],
     /// Spin of each wheel, rad/s.
@@ -72,10 +75,17 @@ impl Observation {
         self.wheel_loads_n.map(|load| load <= 0.0)
     }
 
-    /// Whether both wheels of one side are off the ground.
+    /// Whether both wheels of one side carry nothing. A wheel on rough ground may carry nothing
+    /// for a moment; [`Self::two_wheel_lift_above`] asks for a height.
     #[must_use]
     pub fn two_wheel_lift(&self) -> bool {
-        let [front_left, front_right, rear_left, rear_right] = self.wheels_lifted();
-        (front_left && rear_left) || (front_right && rear_right)
+        metrics::two_wheels_unloaded(&self.wheel_loads_n)
+    }
+
+    /// Whether both wheels of one side are more than `height_m` off the ground; NHTSA's tests ask
+    /// for [`metrics::NHTSA_TWO_WHEEL_LIFT_M`].
+    #[must_use]
+    pub fn two_wheel_lift_above(&self, height_m: f64) -> bool {
+        metrics::two_wheel_clearance_m(&self.wheel_clearance_m) > height_m
     }
 }

@@ -55,6 +55,7 @@ impl Simulation {
             handwheel_actual_rad: state.steering[0],
             road_wheel_rad: dynamics.steering.road_wheel_rad(state.steering[0]),
             wheel_loads_n: loads,
+            wheel_clearance_m: contacts.map(|contact| (-contact.deflection_m).max(0.0)),
             wheel_travel_m: state.travel_m,
             wheel_spin_rad_s: state.spin_rad_s,
             ltr: metrics::load_transfer_ratio(&loads, dynamics.total_mass_kg),
