@@ -1,4 +1,5 @@
 //! Both plants behind one face, and what is read off their runs.
+#![allow(dead_code)] // Each test file uses its own part.
 
 use vehicle_dyn::paper_model::{PaperModel, PaperModelSettings};
 use vehicle_dyn::parameters::VehicleParameters;
@@ -8,6 +9,47 @@ use vehicle_dyn::terrain::Terrain;
 pub const FRICTION: f64 = 0.85;
 pub const TICK_S: f64 = 0.01;
 pub const GRAVITY: f64 = 9.81;
+
+/// A vehicle with hardly anything left that the paper's equations do not know: no camber, rolling
+/// resistance, differential or gyroscopic wheels, roll centres on the ground, dampers alike in bump and
+/// rebound, light wheels, stiff tyres whose slip follows within a few milliseconds.
+pub fn bare(mut vehicle: VehicleParameters) -> VehicleParameters {
+    vehicle.geometry.roll_centre_height_front_m = 0.0;
+    vehicle.geometry.roll_centre_height_rear_m = 0.0;
+    vehicle.mass.unsprung_mass_front_each_kg = 5.0;
+    vehicle.mass.unsprung_mass_rear_each_kg = 5.0;
+    vehicle.wheel.gyroscopic_inertia_front_kg_m2 = 1e-3;
+    vehicle.wheel.gyroscopic_inertia_rear_kg_m2 = 1e-3;
+    vehicle.tyre.vertical_stiffness_front_n_per_m *= 2.0;
+    vehicle.tyre.vertical_stiffness_rear_n_per_m *= 2.0;
+    vehicle.tyre.relaxation_length_lateral_m = 0.05;
+    without_extras(vehicle)
+}
+
+/// Without what can be taken away and leave the vehicle as heavy and as stiff: camber, rolling
+/// resistance, differential, dampers that differ in bump and rebound.
+pub fn without_extras(mut vehicle: VehicleParameters) -> VehicleParameters {
+    let suspension = &mut vehicle.suspension;
+    suspension.camber_gain_front_rad_per_m = 0.0;
+    suspension.camber_gain_rear_rad_per_m = 0.0;
+    let mean = |x: f64, y: f64| 0.5 * (x + y);
+    let front = mean(
+        suspension.damping_bump_front_n_s_per_m,
+        suspension.damping_rebound_front_n_s_per_m,
+    );
+    let rear = mean(
+        suspension.damping_bump_rear_n_s_per_m,
+        suspension.damping_rebound_rear_n_s_per_m,
+    );
+    suspension.damping_bump_front_n_s_per_m = front;
+    suspension.damping_rebound_front_n_s_per_m = front;
+    suspension.damping_bump_rear_n_s_per_m = rear;
+    suspension.damping_rebound_rear_n_s_per_m = rear;
+    vehicle.tyre.camber_thrust_ratio = 0.0;
+    vehicle.tyre.rolling_resistance_coefficient = 0.0;
+    vehicle.powertrain.differential_coupling_nm_s_per_rad = 0.0;
+    vehicle
+}
 
 /// What both plants measure.
 #[derive(Debug, Clone, Copy)]
@@ -41,11 +83,7 @@ pub fn full(vehicle: &VehicleParameters, speed_m_s: f64) -> Plant {
     Plant::Full(Box::new(simulation.expect("valid")))
 }
 
-pub fn paper(
-    vehicle: &VehicleParameters,
-    speed_m_s: f64,
-    settings: PaperModelSettings,
-) -> Plant {
+pub fn paper(vehicle: &VehicleParameters, speed_m_s: f64, settings: PaperModelSettings) -> Plant {
     let model = PaperModel::with_settings(vehicle, FRICTION, pose(speed_m_s), settings);
     Plant::Paper(Box::new(model.expect("valid")))
 }
@@ -116,7 +154,11 @@ pub fn step_figures(mut plant: Plant, handwheel_rad: f64, speed_m_s: f64) -> Ste
             .iter()
             .position(|s| of(s) / wanted >= 1.0)
             .expect("a steady value is reached");
-        let before = if after == 0 { 0.0 } else { of(&seen[after - 1]) };
+        let before = if after == 0 {
+            0.0
+        } else {
+            of(&seen[after - 1])
+        };
         let share = (wanted - before) / (of(&seen[after]) - before);
         TICK_S * (after as f64 + share)
     };
@@ -146,16 +188,18 @@ pub fn response(
     speed_m_s: f64,
 ) -> Response {
     // Whole cycles and whole ticks; the first ones are left out.
-    const SETTLING: usize = 4;
+    const SETTLING: f64 = 4.0;
+    const MEASURED: f64 = 5.0;
     let omega = std::f64::consts::TAU * frequency_hz;
     let per_cycle = 1.0 / (frequency_hz * TICK_S);
-    let from = (SETTLING as f64 * per_cycle).round();
-    let to = ((SETTLING + 5) as f64 * per_cycle).round();
+    let from = (SETTLING * per_cycle).round();
+    let to = ((SETTLING + MEASURED) * per_cycle).round();
     let mut sums = [[0.0; 2]; 3];
-    for tick in 0..(to as usize) {
-        let time = tick as f64 * TICK_S;
+    let ticks = (0..).map(f64::from).take_while(|tick| *tick < to);
+    for tick in ticks {
+        let time = tick * TICK_S;
         let seen = plant.step(amplitude_rad * (omega * time).sin(), speed_m_s);
-        if (tick as f64) < from {
+        if tick < from {
             continue;
         }
         let (sin, cos) = (omega * seen.time_s).sin_cos();
