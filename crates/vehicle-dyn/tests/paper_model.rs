@@ -1,4 +1,5 @@
 //! The paper's model on its own: conservation, symmetry, statics, and what it refuses.
+#![allow(clippy::float_cmp)] // Mirrored runs are compared to the last bit.
 
 mod common;
 #[path = "paper_model/plants.rs"]
