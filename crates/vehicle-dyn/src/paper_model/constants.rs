@@ -4,7 +4,7 @@ use super::{Equations, PaperModelSettings, RollAxis, RollStiffness};
 use crate::parameters::{SolidAxleParameters, VehicleParameters};
 use crate::powertrain::{Powertrain, PowertrainState};
 use crate::steering::SteeringActuator;
-use crate::tyre::{MagicFormula, shape};
+use crate::tyre::MagicFormula;
 use crate::units::GRAVITY_M_S2;
 
 /// Share of the peak force that drive and brake may ask of a tyre.
@@ -59,7 +59,7 @@ pub(super) struct Constants {
     pub friction: f64,
     pub drag_kg_per_m: f64,
     pub axles: [Axle; 2],
-    /// Largest `x` and value `P` of the tyre's shape that drive and brake may use.
+    /// What drive and brake may ask of a tyre.
     slip_limit: SlipLimit,
     pub steering: SteeringActuator,
     pub powertrain: Powertrain,
@@ -70,6 +70,7 @@ pub(super) struct Constants {
 struct SlipLimit {
     c1: f64,
     e1: f64,
+    /// Largest force over the `F_P` of the formula.
     share: f64,
 }
 
@@ -223,7 +224,6 @@ impl SlipLimit {
                 break;
             }
         }
-        debug_assert!((shape(x * self.c1, self.c1, self.e1)[0] - share).abs() < 1e-9);
         x * self.c1
     }
 }
@@ -265,4 +265,36 @@ fn roll_rates(vehicle: &VehicleParameters, choice: RollStiffness) -> [[f64; 2]; 
             [stiffness[i] * share, damping[i] * share * share]
         }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tyre::shape;
+
+    #[test]
+    fn the_slip_gives_the_force_that_was_asked_up_to_the_limit() {
+        for c1 in [0.5, 0.8, 1.0, 1.4, 2.0] {
+            for e1 in [-20.0, -3.0, -0.1, 0.0, 0.5, 0.9, 0.999, 1.0] {
+                let limit = SlipLimit::new(c1, e1);
+                let mut last = 0.0;
+                for percent in 1..=100 {
+                    let share = limit.share * f64::from(percent) / 100.0;
+                    let slip = limit.reduced_slip(share);
+                    let [found, slope] = shape(slip, c1, e1);
+                    assert!((found - share).abs() < 1e-9, "{found}, {share}: {c1} {e1}");
+                    assert!(
+                        slope > 0.0 && slip > last,
+                        "on the rising branch: {c1} {e1}"
+                    );
+                    last = slip;
+                }
+                let beyond = limit.reduced_slip(3.0);
+                assert!(
+                    (beyond - last).abs() <= 1e-9 * last,
+                    "{beyond}, {last}: {c1} {e1}"
+                );
+            }
+        }
+    }
 }

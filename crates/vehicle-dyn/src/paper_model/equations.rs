@@ -2,6 +2,7 @@
 
 use super::Equations;
 use super::constants::Constants;
+use super::load_search::LoadSearch;
 use super::observation::PaperState;
 use crate::simulation::HeldInput;
 use crate::units::GRAVITY_M_S2;
@@ -10,9 +11,21 @@ use crate::units::GRAVITY_M_S2;
 pub(super) const LEAST_SLIP_SPEED_M_S: f64 = 1.0;
 /// Change of the loads, over the vehicle's weight, at which they count as found.
 const LOAD_TOLERANCE: f64 = 1e-11;
-/// Rounds after which the loads are taken as they are. Each round shrinks the error by the loss of
-/// tyre force with load transfer, a factor of about ten.
+/// Rounds after which the loads are taken as they are; two to six are usual.
 const MOST_ROUNDS: usize = 40;
+
+/// What a state says of the wheels whatever they carry.
+struct Given {
+    /// Sine and cosine of the angle of the front wheels.
+    steer: (f64, f64),
+    /// Sine and cosine of the roll angle.
+    roll: (f64, f64),
+    /// `tan α` of both axles (eq. `alpha_f`, `alpha_r`), written without the arc tangent.
+    lateral_slips: [f64; 2],
+    /// Drive less brake force asked of `[left, right]` of both axles, N.
+    wheel_n: [[f64; 2]; 2],
+    drag_n: f64,
+}
 
 /// Loads and forces at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,11 +71,12 @@ struct Accelerations {
 impl Constants {
     /// One step of the classical Runge–Kutta method; returns the instant it began with.
     pub fn rk4(&self, state: &mut PaperState, input: &HeldInput, step: f64) -> Instant {
-        let (k1, now) = self.rates(state, input, None);
-        let guess = Some(&now.loads_n);
-        let (k2, _) = self.rates(&state.advanced(&k1, 0.5 * step), input, guess);
-        let (k3, _) = self.rates(&state.advanced(&k2, 0.5 * step), input, guess);
-        let (k4, _) = self.rates(&state.advanced(&k3, step), input, guess);
+        // What the first stage learns of the loads serves the others.
+        let mut search = self.search();
+        let (k1, now) = self.rates(state, input, &mut search);
+        let (k2, _) = self.rates(&state.advanced(&k1, 0.5 * step), input, &mut search);
+        let (k3, _) = self.rates(&state.advanced(&k2, 0.5 * step), input, &mut search);
+        let (k4, _) = self.rates(&state.advanced(&k3, step), input, &mut search);
         *state = state
             .advanced(&k1, step / 6.0)
             .advanced(&k2, step / 3.0)
@@ -71,14 +85,20 @@ impl Constants {
         now
     }
 
-    /// Rate of the state. `guess` are loads to begin with; those at rest when there are none.
+    /// Loads to begin with: those at rest.
+    pub fn search(&self) -> LoadSearch {
+        let [front, rear] = [&self.axles[0], &self.axles[1]].map(|axle| axle.static_load_n);
+        LoadSearch::new([front, front, rear, rear])
+    }
+
+    /// Rate of the state.
     pub fn rates(
         &self,
         state: &PaperState,
         input: &HeldInput,
-        guess: Option<&[f64; 4]>,
+        search: &mut LoadSearch,
     ) -> (PaperState, Instant) {
-        let now = self.instant(state, guess);
+        let now = self.instant(state, search);
         let found = &now.accelerations;
         let (speed, lateral) = (state.forward_speed_m_s, state.lateral_speed_m_s);
         let yaw_rate = state.yaw_rate_rad_s;
@@ -101,70 +121,68 @@ impl Constants {
     }
 
     /// Loads and tyre forces depend on each other; rounds of one after the other find both.
-    fn instant(&self, state: &PaperState, guess: Option<&[f64; 4]>) -> Instant {
-        let [front, rear] = &self.axles;
-        let at_rest = [
-            front.static_load_n,
-            front.static_load_n,
-            rear.static_load_n,
-            rear.static_load_n,
-        ];
-        let mut loads = *guess.unwrap_or(&at_rest);
+    fn instant(&self, state: &PaperState, search: &mut LoadSearch) -> Instant {
+        let given = self.given(state);
         let tolerance = LOAD_TOLERANCE * self.total_kg * GRAVITY_M_S2;
-        let slips = self.lateral_slips(state);
-        for _ in 0..MOST_ROUNDS {
-            let forces = self.forces(state, &loads, slips);
-            let accelerations = self.accelerations(state, &forces);
-            let next = self.loads(state, &forces, &accelerations);
-            let change = (0..4).fold(0.0_f64, |most, i| most.max((next[i] - loads[i]).abs()));
-            loads = next;
-            if change <= tolerance {
-                break;
+        search.begin();
+        let mut round = 0;
+        loop {
+            let forces = self.forces(&given, &search.loads_n());
+            let accelerations = self.accelerations(state, &given, &forces);
+            let found = self.loads(state, &given, &forces, &accelerations);
+            round += 1;
+            if search.take(&found) <= tolerance || round == MOST_ROUNDS {
+                return Instant {
+                    loads_n: found,
+                    longitudinal_n: forces.longitudinal_n,
+                    lateral_n: forces.lateral_n[0] + forces.lateral_n[1],
+                    accelerations,
+                };
             }
         }
-        let forces = self.forces(state, &loads, slips);
-        Instant {
-            loads_n: loads,
-            longitudinal_n: forces.longitudinal_n,
-            lateral_n: forces.lateral_n[0] + forces.lateral_n[1],
-            accelerations: self.accelerations(state, &forces),
+    }
+
+    fn given(&self, state: &PaperState) -> Given {
+        let steer = self.steering.road_wheel_rad(state.steering[0]).sin_cos();
+        let speed = state.forward_speed_m_s;
+        let slip = |axle: usize, (sin, cos): (f64, f64)| {
+            let across = state.lateral_speed_m_s + self.axles[axle].ahead_m * state.yaw_rate_rad_s;
+            let along = speed * cos + across * sin;
+            let sideways = across * cos - speed * sin;
+            -sideways / along.abs().max(LEAST_SLIP_SPEED_M_S)
+        };
+        let wheel_n = |i: usize| {
+            let radius = self.axles[i].radius_m;
+            let spin = speed / radius;
+            let power = &state.powertrain;
+            self.powertrain
+                .axle_torques_nm(i, power, [spin, spin], radius)
+                .map(|torque| torque / radius)
+        };
+        Given {
+            steer,
+            roll: state.roll_rad.sin_cos(),
+            lateral_slips: [slip(0, steer), slip(1, (0.0, 1.0))],
+            wheel_n: [wheel_n(0), wheel_n(1)],
+            drag_n: self.drag_n(speed),
         }
     }
 
-    /// `tan α` of both axles (eq. `alpha_f`, `alpha_r`), written without the arc tangent.
-    fn lateral_slips(&self, state: &PaperState) -> [f64; 2] {
-        let slip = |axle: usize, steer: f64| {
-            let (sin, cos) = steer.sin_cos();
-            let across = state.lateral_speed_m_s + self.axles[axle].ahead_m * state.yaw_rate_rad_s;
-            let along = state.forward_speed_m_s * cos + across * sin;
-            let sideways = across * cos - state.forward_speed_m_s * sin;
-            -sideways / along.abs().max(LEAST_SLIP_SPEED_M_S)
-        };
-        [slip(0, self.steer_rad(state)), slip(1, 0.0)]
-    }
-
-    fn steer_rad(&self, state: &PaperState) -> f64 {
-        self.steering.road_wheel_rad(state.steering[0])
-    }
-
-    fn forces(&self, state: &PaperState, loads: &[f64; 4], slips: [f64; 2]) -> Forces {
-        let drag = self.drag_n(state.forward_speed_m_s);
-        // At the sprung mass, which leans away from the heading's line.
+    fn forces(&self, given: &Given, loads: &[f64; 4]) -> Forces {
+        let (roll_sin, _) = given.roll;
+        // The drag acts at the sprung mass, which leans away from the heading's line.
         let mut total = Forces {
-            longitudinal_n: -drag,
+            longitudinal_n: -given.drag_n,
             lateral_n: [0.0; 2],
-            yaw_nm: -drag * self.roll_arm_m * state.roll_rad.sin(),
+            yaw_nm: -given.drag_n * self.roll_arm_m * roll_sin,
         };
-        let (sin, cos) = self.steer_rad(state).sin_cos();
+        let (sin, cos) = given.steer;
         for (i, axle) in self.axles.iter().enumerate() {
-            let spin = state.forward_speed_m_s / axle.radius_m;
-            let torques =
-                self.powertrain
-                    .axle_torques_nm(i, &state.powertrain, [spin, spin], axle.radius_m);
             let side = |side: usize| {
                 let load = loads[2 * i + side];
-                let ratio = self.slip_ratio(i, load, torques[side] / axle.radius_m);
-                let [along, across] = axle.tyre.force_n(load, self.friction, [ratio, slips[i]]);
+                let ratio = self.slip_ratio(i, load, given.wheel_n[i][side]);
+                let slip = [ratio, given.lateral_slips[i]];
+                let [along, across] = axle.tyre.force_n(load, self.friction, slip);
                 if i == 0 {
                     [along * cos - across * sin, along * sin + across * cos]
                 } else {
@@ -180,15 +198,14 @@ impl Constants {
         total
     }
 
-    fn accelerations(&self, state: &PaperState, forces: &Forces) -> Accelerations {
-        let (sin, cos) = state.roll_rad.sin_cos();
+    fn accelerations(&self, state: &PaperState, given: &Given, forces: &Forces) -> Accelerations {
+        let (sin, cos) = given.roll;
         let (m, sprung, arm) = (self.total_kg, self.sprung_kg, self.roll_arm_m);
         let first = sprung * arm;
         let (roll_rate, yaw_rate) = (state.roll_rate_rad_s, state.yaw_rate_rad_s);
         let squared = roll_rate * roll_rate;
         let lateral_n = forces.lateral_n[0] + forces.lateral_n[1];
-        let roll_nm =
-            -self.roll_stiffness * state.roll_rad.tan() - self.roll_damping * roll_rate * cos;
+        let roll_nm = -self.roll_stiffness * (sin / cos) - self.roll_damping * roll_rate * cos;
         let coriolis = 2.0 * yaw_rate * roll_rate * cos;
         let [inertia_x, inertia_y, inertia_z] = self.sprung_inertia;
         match self.equations {
@@ -232,12 +249,19 @@ impl Constants {
         }
     }
 
-    fn loads(&self, state: &PaperState, forces: &Forces, found: &Accelerations) -> [f64; 4] {
+    fn loads(
+        &self,
+        state: &PaperState,
+        given: &Given,
+        forces: &Forces,
+        found: &Accelerations,
+    ) -> [f64; 4] {
         let mut loads = [0.0; 4];
         let pitch_nm = self.total_kg * found.longitudinal * self.cg_height_m
-            + self.drag_n(state.forward_speed_m_s) * self.sprung_cg_height_m;
+            + given.drag_n * self.sprung_cg_height_m;
         let shift = 0.5 * pitch_nm / self.wheelbase_m;
-        let (tan, cos) = (state.roll_rad.tan(), state.roll_rad.cos());
+        let (sin, cos) = given.roll;
+        let tan = sin / cos;
         for (i, axle) in self.axles.iter().enumerate() {
             let ahead = if i == 0 { -shift } else { shift };
             let mean = axle.static_load_n

@@ -27,10 +27,12 @@
 //!   sign in a mirrored run. The Coriolis term `2 r p` fits unit and sign, so that is what is used:
 //!   the only change made to the printed equations;
 //! - leave out `ṙ s` there, `r² s` in the second, everything but `I_zz ṙ` in the fourth: all of second
-//!   order in roll and yaw;
-//! - hold in the fifth if the centre of gravity neither rises nor falls (`z̈ = 0`) and `cos φ` is 1
-//!   beside `F_y` and squared in the denominator. Then putting `A_y` of the second equation into the
-//!   fourth line above gives it, the factor `m_uc/m` included;
+//!   or higher order in roll and yaw;
+//! - take the sprung centre of gravity in the fifth as if it neither rose nor fell: then
+//!   `I_xx,SM ṗ = L + m_SM h_SM (g s + c a)` with its lateral acceleration
+//!   `a = F_y/m − (m_uc/m) h_SM (ṗ c − p² s)`. With `cos φ = 1` beside `F_y` and `p²`, and for one of
+//!   two factors in the denominator, this is the printed one. All of it is exact to first order, and the
+//!   loads add up to `m g`;
 //! - add `−m g (Δk + Δd)` to `L`, which is a force, not a moment. Springs that differ by the fraction
 //!   `Δk` between left and right at half-distance `b` give the factor `1 − Δk²` as printed, and the
 //!   moment `m_SM g b Δk`: the weight is the sprung one, and the arm is missing. For dampers no such
@@ -61,6 +63,7 @@
 mod constants;
 mod equations;
 mod linear;
+mod load_search;
 mod observation;
 
 pub use linear::LinearModel;
@@ -294,8 +297,9 @@ impl PaperModel {
     }
 
     fn instant(&self) -> Instant {
+        let mut search = self.constants.search();
         self.constants
-            .rates(&self.state, &HeldInput::AT_REST, None)
+            .rates(&self.state, &HeldInput::AT_REST, &mut search)
             .1
     }
 
