@@ -57,6 +57,16 @@ fn without_extras_both_plants_turn_alike() {
 }
 
 #[test]
+fn without_extras_any_embedded_vehicle_turns_alike_in_both_plants() {
+    for name in vehicle_dyn::vehicles::names() {
+        let vehicle = vehicle_dyn::vehicles::embedded(name).expect("embedded");
+        let [full, model] = both(&without_extras(vehicle), MATCHED, 20.0, 0.05);
+        let ratio = model.yaw_gain / full.yaw_gain;
+        assert!((ratio - 1.0).abs() < 3e-3, "{name}: {ratio}");
+    }
+}
+
+#[test]
 fn the_full_plants_roll_is_explained_by_what_the_paper_leaves_out() {
     // With roll centres on the ground and no camber gain the full plant is simple enough for a closed
     // form: wheels lean with the body, so the whole mass tips about the ground on springs and tyres in

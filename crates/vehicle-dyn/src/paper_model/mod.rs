@@ -46,7 +46,10 @@
 //!   [`RollAxis::Undercarriage`]. Roll centres of cars lie lower; [`RollAxis::RollCentres`] takes them
 //!   from the vehicle. The equations are the same, only `h_SM` changes.
 //! - **Roll stiffness.** `K_s` is the suspension's, and tyres are rigid: [`RollStiffness::Suspension`].
-//!   [`RollStiffness::WithTyres`] puts the tyres' vertical stiffness in series.
+//!   [`RollStiffness::WithTyres`] puts the tyres' vertical stiffness in series to springs, bars and
+//!   dampers. What the links' moment `h F_y` tilts the tyres by is left out still, and so is the roll of
+//!   wheels that lean with the body: the higher the roll centres and the heavier the wheels, the more
+//!   roll is missing (5 % of the sedan's, more of a truck's).
 //! - **Wheel loads.** Not printed; they follow from the balance of the undercarriage about the ground,
 //!   axle by axle (track `T`, height `h` of the roll axis, height `h_u` and lateral acceleration `a_u`
 //!   of its mass `m_u`):
