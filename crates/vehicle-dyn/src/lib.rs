@@ -12,6 +12,7 @@
 //! ```
 //!
 //! with 14 degrees of freedom: six of the sprung body, the travel of four wheels and their spin.
+//! [`paper_model`] is a second, far simpler plant with the same command: the paper's own equations.
 //!
 //! ```
 //! use vehicle_dyn::simulation::{Command, InitialPose, Simulation};
@@ -37,7 +38,8 @@
 //! Tests hold statics, symmetry, energy and momentum, the tyre law, the tilt table and the
 //! convergence of the integrator: the equations are solved right. No test compares the handling
 //! with another vehicle model or with measurements yet, so nothing here shows that they are the
-//! right equations for a given car.
+//! right equations for a given car. [`paper_model`] shares the tyre law but no chassis equation: with a
+//! vehicle reduced to what both know, the two plants agree to 2 % up to 2 Hz and in their roll poles.
 //!
 //! Nothing validates the motion after wheels have lifted: no reference for it was at hand. A wheel
 //! without load loses its slip within about 10 ms ([`wheels`]), and touches down with none. The

@@ -17,16 +17,19 @@ use nalgebra::Vector3;
 
 use crate::parameters::{ParameterError, VehicleParameters};
 pub use crate::powertrain::LongitudinalDemand;
+use crate::steering::SteeringActuator;
 use crate::terrain::Terrain;
 use crate::units::{DEGREE, KMH, wrap_angle};
-use dynamics::{Dynamics, HeldInput};
+use dynamics::Dynamics;
+pub(crate) use dynamics::HeldInput;
+pub(crate) use settle::check_pose;
 
 /// Integration step unless another is asked for, s.
 pub const DEFAULT_SUBSTEP_S: f64 = 1e-3;
 /// Longest time one call of [`Simulation::step`] may advance, s.
 const LONGEST_TICK_S: f64 = 10.0;
 /// Largest speed a simulation may start with or be asked for, m/s.
-const LARGEST_SPEED_M_S: f64 = 150.0;
+pub(crate) const LARGEST_SPEED_M_S: f64 = 150.0;
 /// Largest acceleration that may be asked for, m/s².
 const LARGEST_ACCELERATION_M_S2: f64 = 100.0;
 
@@ -162,7 +165,7 @@ impl Simulation {
                 range: "in (0, 5e-3]",
             });
         }
-        settle::check_pose(&initial)?;
+        check_pose(&initial)?;
         let dynamics = Dynamics::new(vehicle);
         let state = settle::rolling_state(&dynamics, initial.speed_m_s, substep_s);
         let mut simulation = Self {
@@ -265,51 +268,63 @@ impl Simulation {
     }
 
     fn checked(&self, command: Command) -> Result<HeldInput, SimulationError> {
-        let refuse = |what, value, range| {
-            Err(SimulationError::Command {
-                what,
-                value,
-                range,
-                time_s: self.time_s(),
-            })
-        };
-        if !command.handwheel_rad.is_finite() {
-            return refuse("handwheel_rad", command.handwheel_rad, "a finite number");
-        }
-        match command.longitudinal {
-            LongitudinalDemand::TargetSpeed(speed)
-                if !(0.0..=LARGEST_SPEED_M_S).contains(&speed) =>
-            {
-                return refuse("target_speed_m_s", speed, "in [0, 150] m/s");
-            }
-            LongitudinalDemand::Acceleration(asked)
-                if !(-LARGEST_ACCELERATION_M_S2..=LARGEST_ACCELERATION_M_S2).contains(&asked) =>
-            {
-                return refuse("acceleration_m_s2", asked, "in [-100, 100] m/s²");
-            }
-            _ => {}
-        }
-        Ok(HeldInput {
-            handwheel_rad: self.dynamics.steering.limited_rad(command.handwheel_rad),
-            longitudinal: command.longitudinal,
-        })
+        checked_command(command, &self.dynamics.steering, self.time_s())
     }
 
     fn substeps_in(&self, tick_s: f64) -> Result<u64, SimulationError> {
-        const WHOLE: f64 = 1e-6;
-        let ratio = tick_s / self.substep_s;
-        let whole = ratio.round();
-        if !(tick_s > 0.0 && tick_s <= LONGEST_TICK_S) || (ratio - whole).abs() > WHOLE {
-            return Err(SimulationError::TimeStep {
-                what: "tick",
-                value: tick_s,
-                range: "a whole number of substeps in (0, 10]",
-            });
-        }
-        // In (0, 10 s / substep], so it fits and is not negative.
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        Ok(whole as u64)
+        whole_substeps(tick_s, self.substep_s)
     }
+}
+
+/// The command as the vehicle takes it, or what is wrong with it at `time_s`.
+pub(crate) fn checked_command(
+    command: Command,
+    steering: &SteeringActuator,
+    time_s: f64,
+) -> Result<HeldInput, SimulationError> {
+    let refuse = |what, value, range| {
+        Err(SimulationError::Command {
+            what,
+            value,
+            range,
+            time_s,
+        })
+    };
+    if !command.handwheel_rad.is_finite() {
+        return refuse("handwheel_rad", command.handwheel_rad, "a finite number");
+    }
+    match command.longitudinal {
+        LongitudinalDemand::TargetSpeed(speed) if !(0.0..=LARGEST_SPEED_M_S).contains(&speed) => {
+            return refuse("target_speed_m_s", speed, "in [0, 150] m/s");
+        }
+        LongitudinalDemand::Acceleration(asked)
+            if !(-LARGEST_ACCELERATION_M_S2..=LARGEST_ACCELERATION_M_S2).contains(&asked) =>
+        {
+            return refuse("acceleration_m_s2", asked, "in [-100, 100] m/s²");
+        }
+        _ => {}
+    }
+    Ok(HeldInput {
+        handwheel_rad: steering.limited_rad(command.handwheel_rad),
+        longitudinal: command.longitudinal,
+    })
+}
+
+/// How many steps of `substep_s` make up `tick_s`.
+pub(crate) fn whole_substeps(tick_s: f64, substep_s: f64) -> Result<u64, SimulationError> {
+    const WHOLE: f64 = 1e-6;
+    let ratio = tick_s / substep_s;
+    let whole = ratio.round();
+    if !(tick_s > 0.0 && tick_s <= LONGEST_TICK_S) || (ratio - whole).abs() > WHOLE {
+        return Err(SimulationError::TimeStep {
+            what: "tick",
+            value: tick_s,
+            range: "a whole number of substeps in (0, 10]",
+        });
+    }
+    // In (0, 10 s / substep], so it fits and is not negative.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    Ok(whole as u64)
 }
 
 /// One classical Runge–Kutta step of fourth order.

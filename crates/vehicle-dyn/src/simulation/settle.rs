@@ -13,7 +13,7 @@ use crate::units::GRAVITY_M_S2;
 const SETTLING_TIME_S: f64 = 8.0;
 
 /// Refuses poses that are no numbers or too fast.
-pub(super) fn check_pose(pose: &InitialPose) -> Result<(), SimulationError> {
+pub(crate) fn check_pose(pose: &InitialPose) -> Result<(), SimulationError> {
     for (what, value) in [
         ("x_m", pose.x_m),
         ("y_m", pose.y_m),
