@@ -1,9 +1,11 @@
 //! A controller as it stands in a scenario file: flat, with a `method` that says which fields apply.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use deepc_core::program::Regularisation;
-use serde::Deserialize;
+use serde::de::Error;
+use serde::{Deserialize, Deserializer};
 use sysid::IdentificationSettings;
 use sysid::lmpc::OffsetHandling;
 use thiserror::Error;
@@ -14,17 +16,19 @@ use super::controllers::{
 use crate::summary::InputWeights;
 
 /// The fields of every method. Which must be there and which must not, `method` decides.
-#[derive(Deserialize)]
+#[derive(Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct ControllerEntry {
-    description: String,
-    method: Method,
-    past_steps: usize,
-    horizon_steps: usize,
-    moves_per_solve: usize,
-    ltr_limit: f64,
-    ltr_penalty: LtrPenalty,
-    input_weights: InputWeights,
+struct ControllerEntry {
+    /// Another controller of the file: fields that are not given are taken from it.
+    like: Option<String>,
+    description: Option<String>,
+    method: Option<Method>,
+    past_steps: Option<usize>,
+    horizon_steps: Option<usize>,
+    moves_per_solve: Option<usize>,
+    ltr_limit: Option<f64>,
+    ltr_penalty: Option<LtrPenalty>,
+    input_weights: Option<InputWeights>,
     order_bound: Option<usize>,
     regularisation: Option<Regularisation>,
     lambda_u: Option<f64>,
@@ -35,7 +39,7 @@ pub(super) struct ControllerEntry {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub(super) enum Method {
+enum Method {
     Deepc,
     RdDeepc,
     Lmpc,
@@ -53,7 +57,13 @@ impl fmt::Display for Method {
 
 /// A field that does not go with the method.
 #[derive(Debug, Error)]
-pub(super) enum FieldError {
+enum FieldError {
+    #[error("missing field `{field}`")]
+    Absent { field: &'static str },
+    #[error("`like` = \"{like}\" names no controller of this file: choose one of {known}")]
+    UnknownLike { like: String, known: String },
+    #[error("`like` leads back to itself: {chain}")]
+    Circle { chain: String },
     #[error("missing field `{field}`, which method = \"{method}\" needs")]
     Missing { field: &'static str, method: Method },
     #[error("field `{field}` does not apply to method = \"{method}\", {why}: remove it")]
@@ -88,31 +98,99 @@ impl Method {
     }
 }
 
+/// The `[controllers]` table, with what `like` takes over filled in.
+pub(super) fn controllers<'de, D: Deserializer<'de>>(
+    deserializer: D,
+) -> Result<BTreeMap<String, ControllerSettings>, D::Error> {
+    let entries = BTreeMap::<String, ControllerEntry>::deserialize(deserializer)?;
+    entries
+        .keys()
+        .map(|name| {
+            let settings =
+                resolved(name, &entries).and_then(|entry| ControllerSettings::try_from(entry));
+            let wrong = |error| D::Error::custom(format!("in controllers.{name}: {error}"));
+            Ok((name.clone(), settings.map_err(wrong)?))
+        })
+        .collect()
+}
+
+/// The entry `name` with the fields it does not give from those it is like.
+fn resolved(
+    name: &str,
+    entries: &BTreeMap<String, ControllerEntry>,
+) -> Result<ControllerEntry, FieldError> {
+    let mut chain = vec![name];
+    let mut entry = entries[name].clone();
+    while let Some(like) = entry.like.take() {
+        let Some((base_name, base)) = entries.get_key_value(&like) else {
+            let known: Vec<&str> = entries.keys().map(String::as_str).collect();
+            return Err(FieldError::UnknownLike {
+                like,
+                known: known.join(", "),
+            });
+        };
+        chain.push(base_name);
+        if chain[..chain.len() - 1].contains(&base_name.as_str()) {
+            return Err(FieldError::Circle {
+                chain: chain.join(" → "),
+            });
+        }
+        entry = entry.or(base);
+    }
+    Ok(entry)
+}
+
 impl TryFrom<ControllerEntry> for ControllerSettings {
     type Error = FieldError;
 
     fn try_from(entry: ControllerEntry) -> Result<Self, FieldError> {
-        let prediction = match entry.method {
-            Method::Deepc => Prediction::Data(entry.data(DataMatrix::Whole)?),
-            Method::RdDeepc => Prediction::Data(entry.data(DataMatrix::Reduced)?),
-            Method::Lmpc => Prediction::Model(entry.model()?),
+        let method = given("method", entry.method)?;
+        let prediction = match method {
+            Method::Deepc => Prediction::Data(entry.data(method, DataMatrix::Whole)?),
+            Method::RdDeepc => Prediction::Data(entry.data(method, DataMatrix::Reduced)?),
+            Method::Lmpc => Prediction::Model(entry.model(method)?),
         };
         Ok(Self {
-            description: entry.description,
-            past_steps: entry.past_steps,
-            horizon_steps: entry.horizon_steps,
-            moves_per_solve: entry.moves_per_solve,
-            ltr_limit: entry.ltr_limit,
-            ltr_penalty: entry.ltr_penalty,
-            input_weights: entry.input_weights,
+            description: given("description", entry.description)?,
+            past_steps: given("past_steps", entry.past_steps)?,
+            horizon_steps: given("horizon_steps", entry.horizon_steps)?,
+            moves_per_solve: given("moves_per_solve", entry.moves_per_solve)?,
+            ltr_limit: given("ltr_limit", entry.ltr_limit)?,
+            ltr_penalty: given("ltr_penalty", entry.ltr_penalty)?,
+            input_weights: given("input_weights", entry.input_weights)?,
             prediction,
         })
     }
 }
 
+fn given<T>(field: &'static str, value: Option<T>) -> Result<T, FieldError> {
+    value.ok_or(FieldError::Absent { field })
+}
+
 impl ControllerEntry {
-    fn data(&self, matrix: DataMatrix) -> Result<DataSettings, FieldError> {
-        let method = self.method;
+    /// Fields that are not given, from `base`; what `base` is like is followed next.
+    fn or(self, base: &Self) -> Self {
+        let base = base.clone();
+        Self {
+            like: base.like,
+            description: self.description.or(base.description),
+            method: self.method.or(base.method),
+            past_steps: self.past_steps.or(base.past_steps),
+            horizon_steps: self.horizon_steps.or(base.horizon_steps),
+            moves_per_solve: self.moves_per_solve.or(base.moves_per_solve),
+            ltr_limit: self.ltr_limit.or(base.ltr_limit),
+            ltr_penalty: self.ltr_penalty.or(base.ltr_penalty),
+            input_weights: self.input_weights.or(base.input_weights),
+            order_bound: self.order_bound.or(base.order_bound),
+            regularisation: self.regularisation.or(base.regularisation),
+            lambda_u: self.lambda_u.or(base.lambda_u),
+            lambda_y: self.lambda_y.or(base.lambda_y),
+            identification: self.identification.or(base.identification),
+            offset_handling: self.offset_handling.or(base.offset_handling),
+        }
+    }
+
+    fn data(&self, method: Method, matrix: DataMatrix) -> Result<DataSettings, FieldError> {
         method.has_no("identification", self.identification.as_ref())?;
         method.has_no("offset_handling", self.offset_handling.as_ref())?;
         Ok(DataSettings {
@@ -124,8 +202,7 @@ impl ControllerEntry {
         })
     }
 
-    fn model(&self) -> Result<ModelSettings, FieldError> {
-        let method = self.method;
+    fn model(&self, method: Method) -> Result<ModelSettings, FieldError> {
         method.has_no("order_bound", self.order_bound.as_ref())?;
         method.has_no("regularisation", self.regularisation.as_ref())?;
         method.has_no("lambda_u", self.lambda_u.as_ref())?;

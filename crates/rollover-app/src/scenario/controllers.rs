@@ -5,12 +5,10 @@ use serde::Deserialize;
 use sysid::IdentificationSettings;
 use sysid::lmpc::OffsetHandling;
 
-use super::controller_file::ControllerEntry;
 use crate::summary::InputWeights;
 
 /// Settings of one controller: what every method shares, and how the future is predicted.
-#[derive(Debug, Clone, Deserialize)]
-#[serde(try_from = "ControllerEntry")]
+#[derive(Debug, Clone)]
 pub struct ControllerSettings {
     /// What is special about it, in a sentence.
     pub description: String,
