@@ -17,6 +17,7 @@ use crate::closed_loop::{DrivenVehicle, INPUTS, OUTPUTS};
 use crate::interrupt::Interrupt;
 use crate::output::write_whole;
 use crate::scenario::Scenario;
+use crate::terrain;
 
 /// Names of the input columns of a recording.
 pub const INPUT_COLUMNS: [&str; 2] = ["steering_wheel_deg", "target_speed_kmh"];
@@ -53,7 +54,14 @@ pub fn record(
     interrupt: &Interrupt,
 ) -> Result<(Dataset, RecordingSummary)> {
     let recipe = &scenario.recording;
-    let mut plant = DrivenVehicle::new(scenario, vehicle, &recipe.course, recipe.target_speed_kmh)?;
+    let terrain = terrain::build(scenario.recording_ground(), &recipe.course, interrupt)?;
+    let mut plant = DrivenVehicle::new(
+        scenario,
+        vehicle,
+        &recipe.course,
+        terrain,
+        recipe.target_speed_kmh,
+    )?;
     let mut noise = ChaCha8Rng::seed_from_u64(seed);
     let steering_noise = normal(recipe.steering_wheel_noise_deg)?;
     let speed_noise = normal(recipe.target_speed_noise_kmh)?;

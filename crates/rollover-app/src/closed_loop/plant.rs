@@ -28,17 +28,19 @@ pub struct DrivenVehicle {
 }
 
 impl DrivenVehicle {
-    /// Puts the vehicle at the start of the course, rolling at `speed_kmh`.
+    /// Puts the vehicle at the start of the course on its terrain, rolling at `speed_kmh`.
     ///
     /// # Errors
-    /// When the vehicle or the course cannot be built.
+    /// When the vehicle or the course cannot be built, or the terrain is smaller than the course.
     pub fn new(
         scenario: &Scenario,
         vehicle: &VehicleParameters,
         course: &CourseDescription,
+        terrain: Terrain,
         speed_kmh: f64,
     ) -> Result<Self> {
         let course = Course::new(course)?;
+        terrain.check_covers(&course)?;
         let start = course.point(0.0);
         let pose = InitialPose {
             x_m: start.x_m,
@@ -46,7 +48,7 @@ impl DrivenVehicle {
             yaw_rad: start.heading_rad,
             speed_m_s: speed_kmh / 3.6,
         };
-        let simulation = Simulation::new(vehicle, Terrain::flat(scenario.ground.friction), pose)?;
+        let simulation = Simulation::new(vehicle, terrain, pose)?;
         let seen = simulation.observation();
         Ok(Self {
             location: course.locate(seen.x_m, seen.y_m, Some(0.0)),

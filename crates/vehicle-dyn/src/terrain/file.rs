@@ -276,7 +276,13 @@ pub(super) struct Arrays {
 
 impl Arrays {
     fn open(bytes: Vec<u8>) -> Result<Self, String> {
-        let archive = zip::ZipArchive::new(Cursor::new(bytes)).map_err(|e| e.to_string())?;
+        let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).map_err(|e| e.to_string())?;
+        // Reading to the end checks the sum of every array, also of those not asked for.
+        for index in 0..archive.len() {
+            let entry = archive.by_index(index).map_err(|e| e.to_string())?;
+            std::io::copy(&mut entry.take(LARGEST_ARRAY_BYTES), &mut std::io::sink())
+                .map_err(|e| e.to_string())?;
+        }
         let names = archive
             .file_names()
             .filter_map(|file| {

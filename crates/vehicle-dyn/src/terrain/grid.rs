@@ -26,7 +26,7 @@ pub(super) const TILE_M: f64 = TILE as f64 / NODES_PER_M;
 pub(super) type TileIndex = [i32; 2];
 
 /// A ground made for a course.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Clone, PartialEq)]
 pub(super) struct Grid {
     /// What it was made from; never mirrored.
     pub ground: GroundDescription,
@@ -49,7 +49,7 @@ pub(super) struct Grid {
 }
 
 /// Numbers of the tiles within the rectangle around them.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Clone, PartialEq)]
 pub(super) struct Lookup {
     first: TileIndex,
     size: [usize; 2],
@@ -130,6 +130,17 @@ fn split(cells: f64) -> (i64, usize, f64) {
     let node = whole as i64;
     let tile = node.div_euclid(CELLS);
     (tile, node.rem_euclid(CELLS) as usize, cells - whole)
+}
+
+// A grid is millions of numbers: a message shows how many instead.
+impl std::fmt::Debug for Grid {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter
+            .debug_struct("Grid")
+            .field("ground", &self.ground)
+            .field("tiles", &self.tiles.len())
+            .finish_non_exhaustive()
+    }
 }
 
 impl Grid {

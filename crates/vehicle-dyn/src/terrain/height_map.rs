@@ -29,7 +29,7 @@ pub(super) struct HeightNodes {
 }
 
 /// The spline through the nodes of a map. Beyond the map's edge the height of the edge goes on level.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Clone, PartialEq)]
 pub(super) struct HeightMap {
     x0_m: f64,
     y0_m: f64,
@@ -41,6 +41,19 @@ pub(super) struct HeightMap {
     /// Friction; as it is a weighted mean of nodes, it never leaves their range.
     frictions: Option<Vec<f64>>,
     uniform_friction: f64,
+}
+
+// A map is many numbers: a message shows how many instead.
+impl std::fmt::Debug for HeightMap {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter
+            .debug_struct("HeightMap")
+            .field("x0_m", &self.x0_m)
+            .field("y0_m", &self.y0_m)
+            .field("spacing_m", &self.spacing_m)
+            .field("size", &self.size)
+            .finish_non_exhaustive()
+    }
 }
 
 impl HeightMap {
