@@ -20,7 +20,7 @@ const PROFILE_HEIGHT: u32 = 210;
 const LEFT: u32 = 70;
 const RIGHT: u32 = 100;
 /// How far beside the road the pictures reach, m.
-const MAP_BESIDE_M: f64 = 25.0;
+const MAP_BESIDE_M: f64 = 45.0;
 const STRIP_BESIDE_M: f64 = 4.0;
 /// Image pixels to a pixel of the page.
 const FINE: f64 = 2.0;
@@ -201,7 +201,7 @@ impl<'a> View<'a> {
     fn heights(&self, area: &Area<'_>) -> Drawn<()> {
         let [low, high] = self.survey.range(|s| s.height_m);
         let room = 0.15 * (high - low).max(LEAST_SCALE_M);
-        let y = (low - room, high + 2.0 * room);
+        let y = (low - room, high + 4.0 * room);
         let x = (0.0, self.course.total_length_m());
         let mut chart = chart(area, "Height under the wheel tracks", x, y)?;
         mesh(&mut chart, "station, m", "height, m", GRID)?;
@@ -238,7 +238,7 @@ impl<'a> View<'a> {
         )?;
         mesh(&mut bank, "station, m", "cross slope, %", GRID)?;
         self.line(&mut bank, "", INK, |s| s.cross_slope_percent)?;
-        let mut friction = chart(&right, "Friction under the tracks", x, (0.0, 1.25 * grippy))?;
+        let mut friction = chart(&right, "Friction under the tracks", x, (0.0, 1.5 * grippy))?;
         mesh(&mut friction, "station, m", "friction", GRID)?;
         self.line(&mut friction, "0.7 m left", LEFT_TRACK, |s| s.friction[0])?;
         self.line(&mut friction, "0.7 m right", RIGHT_TRACK, |s| s.friction[1])?;
@@ -339,6 +339,7 @@ fn chart<'a, 'b>(
 ) -> Drawn<Chart<'a, 'b>> {
     Ok(ChartBuilder::on(area)
         .margin_top(6)
+        .margin_left(10)
         .margin_right(RIGHT)
         .caption(caption, (FONT, 15).into_font().color(&INK))
         .x_label_area_size(40)
