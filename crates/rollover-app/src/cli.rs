@@ -20,6 +20,8 @@ pub enum Command {
     Paper(PaperArgs),
     /// One scenario with one controller: log, summary and figures.
     Run(RunArgs),
+    /// The ground of a scenario: a file to run on and to look into, and a picture.
+    Terrain(TerrainArgs),
     /// Records the data a controller works from, by the paper's recipe.
     Record(RecordArgs),
     /// Identifies a linear model from recordings: model file, report, figures.
@@ -63,10 +65,33 @@ pub struct RunArgs {
     /// Recording to work from, instead of making one from the seed.
     #[arg(long, value_name = "FILE")]
     pub recording: Option<PathBuf>,
+    /// Terrain file that `terrain` wrote, or map of measured heights (`.npz`, `.csv`), instead of the
+    /// scenario's ground.
+    #[arg(long, value_name = "FILE")]
+    pub terrain: Option<PathBuf>,
     /// Speed at the start and reference afterwards, instead of the scenario's.
     #[arg(long, value_name = "KMH", value_parser = speed_kmh, allow_negative_numbers = true)]
     pub speed: Option<f64>,
     /// Print the summary as JSON on standard output.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `terrain`.
+#[derive(Debug, Args)]
+pub struct TerrainArgs {
+    /// Name of a scenario, or path of a scenario file.
+    pub scenario: String,
+    /// Folder for `terrain.npz`, `terrain.svg` and `terrain.json`; by default `out/SCENARIO`.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// The ground of the recording's course instead of that of the runs.
+    #[arg(long)]
+    pub recording: bool,
+    /// The mirror image: the course and its ground with left and right exchanged.
+    #[arg(long)]
+    pub mirror: bool,
+    /// Print the terrain's summary as JSON on standard output.
     #[arg(long)]
     pub json: bool,
 }

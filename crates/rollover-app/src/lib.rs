@@ -20,6 +20,7 @@ pub mod report;
 pub mod run_log;
 pub mod scenario;
 pub mod summary;
+pub mod terrain;
 
 use anyhow::Result;
 use interrupt::Interrupt;
@@ -33,6 +34,7 @@ pub fn execute(command: &cli::Command, interrupt: &Interrupt) -> Result<()> {
     match command {
         cli::Command::Paper(args) => campaign::paper(args, interrupt),
         cli::Command::Run(args) => campaign::single(args, interrupt),
+        cli::Command::Terrain(args) => terrain::command(args, interrupt),
         cli::Command::Record(args) => campaign::record_only(args, interrupt),
         cli::Command::Identify(args) => identify::identify(args, interrupt),
     }

@@ -23,7 +23,7 @@ pub fn create_folder(path: &Path) -> Result<()> {
 ///
 /// # Errors
 /// When the folder cannot be written.
-pub fn write_whole(path: &Path, contents: &str) -> Result<()> {
+pub fn write_whole(path: &Path, contents: impl AsRef<[u8]>) -> Result<()> {
     let partial = path.with_added_extension("partial");
     let written = std::fs::write(&partial, contents).and_then(|()| std::fs::rename(&partial, path));
     written.with_context(|| {

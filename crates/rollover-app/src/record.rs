@@ -17,6 +17,7 @@ use crate::closed_loop::{DrivenVehicle, INPUTS, OUTPUTS};
 use crate::interrupt::Interrupt;
 use crate::output::write_whole;
 use crate::scenario::Scenario;
+use crate::terrain;
 
 /// Names of the input columns of a recording.
 pub const INPUT_COLUMNS: [&str; 2] = ["steering_wheel_deg", "target_speed_kmh"];
@@ -55,10 +56,12 @@ pub fn record(
     interrupt: &Interrupt,
 ) -> Result<(Dataset, RecordingSummary)> {
     let recipe = &scenario.recording;
+    let terrain = terrain::build(scenario.recording_ground(), &recipe.course, interrupt)?;
     let mut plant = DrivenVehicle::new(
         scenario,
         vehicle,
         &recipe.course,
+        terrain,
         recipe.target_speed_kmh,
         (seed, "recording"),
     )?;

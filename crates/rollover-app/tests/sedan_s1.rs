@@ -10,6 +10,7 @@ use rollover_app::scenario::{DRIVER, Scenario, load};
 use vehicle_dyn::metrics::Outcome;
 use vehicle_dyn::parameters::VehicleParameters;
 use vehicle_dyn::road::{Course, Segment};
+use vehicle_dyn::terrain::Terrain;
 
 /// Recording seeds that were not used to choose the settings (docs/decisions/0005-sedan-s1.md).
 const JUDGED_SEEDS: std::ops::Range<u64> = 10..20;
@@ -41,6 +42,7 @@ fn drive(name: &str, seed: u64, speed_reference_kmh: f64) -> Finished {
     let order = Run {
         scenario: &scenario,
         vehicle: &vehicle,
+        terrain: Terrain::flat(scenario.ground.friction),
         speed_reference_kmh,
         seed,
         controller,

@@ -10,6 +10,7 @@ use sysid::{Identification, Progress};
 use vehicle_dyn::metrics::Outcome;
 use vehicle_dyn::parameters::VehicleParameters;
 use vehicle_dyn::road::Course;
+use vehicle_dyn::terrain::Terrain;
 
 use crate::closed_loop::{self, Built, Recorded, Run, Watch};
 use crate::interrupt::Interrupt;
@@ -27,6 +28,7 @@ const IDENTIFICATION_JSON: &str = "identification.json";
 pub(super) struct Job<'a> {
     pub(super) scenario: &'a Scenario,
     pub(super) vehicle: &'a VehicleParameters,
+    pub(super) terrain: Terrain,
     pub(super) controller: &'a str,
     pub(super) seed: u64,
     pub(super) speed_reference_kmh: f64,
@@ -79,6 +81,7 @@ impl Job<'_> {
         let run = Run {
             scenario: self.scenario,
             vehicle: self.vehicle,
+            terrain: self.terrain.clone(),
             speed_reference_kmh: self.speed_reference_kmh,
             seed: self.seed,
             controller,
@@ -115,7 +118,7 @@ impl Job<'_> {
 /// Writes the model and all that was found beside it.
 fn write_identification(folder: &Path, found: &Identification) -> Result<()> {
     write_whole(&folder.join(MODEL), &found.model.to_json()?)?;
-    write_whole(&folder.join(IDENTIFICATION_TEXT), &found.report.to_string())?;
+    write_whole(&folder.join(IDENTIFICATION_TEXT), found.report.to_string())?;
     write_json(&folder.join(IDENTIFICATION_JSON), &found.report)
 }
 

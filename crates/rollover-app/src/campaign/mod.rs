@@ -16,6 +16,7 @@ use crate::record::{self, record};
 use crate::report::{self, Page, PageRun, RunTrace};
 use crate::scenario::{self, DRIVER, Scenario};
 use crate::summary::Summary;
+use crate::terrain;
 use job::{
     Job, RunResult, cores, remove_old_results, road_edges, run_all, step_bar, write_figures,
 };
@@ -42,9 +43,11 @@ pub fn paper(args: &PaperArgs, interrupt: &Interrupt) -> Result<()> {
     remove_old_results(&args.out)?;
     let dataset = recording(&scenario, &vehicle, args.seed, &args.out, interrupt)?;
     let recorded = Recorded::new(&dataset);
+    let terrain = terrain::build(&scenario.ground, &scenario.course, interrupt)?;
     let job = |controller: &'static str| Job {
         scenario: &scenario,
         vehicle: &vehicle,
+        terrain: terrain.clone(),
         controller,
         seed: args.seed,
         speed_reference_kmh: scenario.speed_reference_kmh,
@@ -101,6 +104,10 @@ pub fn single(args: &RunArgs, interrupt: &Interrupt) -> Result<()> {
         args.controller,
         scenario.name
     );
+    let terrain = match &args.terrain {
+        Some(file) => terrain::read(file, &scenario)?,
+        None => terrain::build(&scenario.ground, &scenario.course, interrupt)?,
+    };
     let out = args
         .out
         .clone()
@@ -115,6 +122,7 @@ pub fn single(args: &RunArgs, interrupt: &Interrupt) -> Result<()> {
     let job = Job {
         scenario: &scenario,
         vehicle: &vehicle,
+        terrain,
         controller: &args.controller,
         seed: args.seed,
         speed_reference_kmh,
@@ -211,6 +219,6 @@ fn load_vehicle(name_or_path: &str) -> Result<VehicleParameters> {
     Ok(vehicle_dyn::vehicles::find(name_or_path)?)
 }
 
-fn default_folder(scenario: &Scenario) -> PathBuf {
+pub(crate) fn default_folder(scenario: &Scenario) -> PathBuf {
     Path::new("out").join(&scenario.name)
 }

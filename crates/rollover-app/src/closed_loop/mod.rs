@@ -11,6 +11,7 @@ use anyhow::{Context, Result, bail};
 use deepc_core::controller::{Controller, Origin, Plant, Reference};
 use vehicle_dyn::metrics::{Outcome, two_wheel_clearance_m};
 use vehicle_dyn::parameters::VehicleParameters;
+use vehicle_dyn::terrain::Terrain;
 
 pub use build::{Built, controller};
 pub use plant::{DrivenVehicle, INPUTS, OUTPUTS};
@@ -26,6 +27,8 @@ pub struct Run<'a> {
     pub scenario: &'a Scenario,
     /// Its vehicle.
     pub vehicle: &'a VehicleParameters,
+    /// The ground under its course.
+    pub terrain: Terrain,
     /// Speed at the start and reference afterwards, km/h.
     pub speed_reference_kmh: f64,
     /// Seed of the sensors' random numbers.
@@ -57,6 +60,7 @@ pub fn run(
         run.scenario,
         run.vehicle,
         &run.scenario.course,
+        run.terrain.clone(),
         run.speed_reference_kmh,
         (run.seed, "run"),
     )?;

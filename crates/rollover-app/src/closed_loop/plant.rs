@@ -37,20 +37,23 @@ pub struct DrivenVehicle {
 }
 
 impl DrivenVehicle {
-    /// Puts the vehicle at the start of the course, rolling at `speed_kmh`. The sensors' random
+    /// Puts the vehicle at the start of the course on its terrain, rolling at `speed_kmh`. The sensors' random
     /// numbers come from `seed` and from `purpose`, so that a run and the recording it works from
     /// differ.
     ///
     /// # Errors
-    /// When the vehicle, the course or a sensor cannot be built.
+    /// When the vehicle, the course or a sensor cannot be built, or the terrain is smaller than the
+    /// course.
     pub fn new(
         scenario: &Scenario,
         vehicle: &VehicleParameters,
         course: &CourseDescription,
+        terrain: Terrain,
         speed_kmh: f64,
         (seed, purpose): (u64, &str),
     ) -> Result<Self> {
         let course = Course::new(course)?;
+        terrain.check_covers(&course)?;
         let start = course.point(0.0);
         let pose = InitialPose {
             x_m: start.x_m,
@@ -58,7 +61,7 @@ impl DrivenVehicle {
             yaw_rad: start.heading_rad,
             speed_m_s: speed_kmh / 3.6,
         };
-        let simulation = Simulation::new(vehicle, Terrain::flat(scenario.ground.friction), pose)?;
+        let simulation = Simulation::new(vehicle, terrain, pose)?;
         let seen = simulation.observation();
         let mut sensors = Sensors::new(
             &scenario.sensors,

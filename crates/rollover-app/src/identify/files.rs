@@ -48,7 +48,7 @@ pub(super) fn write_all(
     write_whole(&folder.join(MODEL), &model)?;
     write_whole(&folder.join(MATLAB), &matlab)?;
     write_json(&folder.join(REPORT), &results.report)?;
-    write_whole(&folder.join(TEXT), &super::words::report(results))?;
+    write_whole(&folder.join(TEXT), super::words::report(results))?;
     for figure in figures {
         write_whole(&folder.join(format!("{}.svg", figure.file)), &figure.svg)?;
     }

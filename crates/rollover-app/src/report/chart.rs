@@ -33,11 +33,11 @@ const PALETTE: [RGBColor; 6] = [
     RGBColor(230, 159, 0),
     RGBColor(86, 180, 233),
 ];
-const INK: RGBColor = RGBColor(45, 49, 54);
-const GRID: RGBColor = RGBColor(226, 229, 233);
+pub(crate) const INK: RGBColor = RGBColor(45, 49, 54);
+pub(crate) const GRID: RGBColor = RGBColor(226, 229, 233);
 /// Half the size of the mark where a run ended early, in pixels.
 const CROSS_SIZE: i32 = 6;
-const FONT: &str = "Helvetica, Arial, sans-serif";
+pub(crate) const FONT: &str = "Helvetica, Arial, sans-serif";
 
 /// Colour of the `index`-th run of a figure.
 pub(super) fn run_colour(index: usize) -> RGBColor {
@@ -50,7 +50,7 @@ pub(super) fn limit_style() -> ShapeStyle {
 }
 
 /// A tick's number without the zeros that say nothing.
-fn tick(value: f64) -> String {
+pub(crate) fn tick(value: f64) -> String {
     // Ticks are multiples of a round step; what is left beyond is rounding.
     let rounded = (value * 1e6).round() / 1e6;
     // Adding zero turns −0 into 0.

@@ -7,6 +7,7 @@ use sysid::lmpc::OffsetHandling;
 use thiserror::Error;
 use vehicle_dyn::road::Course;
 use vehicle_dyn::sensors::{Channel, Sensor, SensorError};
+use vehicle_dyn::terrain::GroundError;
 
 use super::{
     CONTROLLER_CHANNEL, ControllerSettings, DRIVER_CHANNELS, ModelSettings, Prediction, Scenario,
@@ -61,6 +62,16 @@ pub enum ScenarioError {
         value: String,
         /// What it may hold.
         allowed: String,
+    },
+    /// A ground is not allowed or does not fit its course.
+    #[error("{origin}: {of}{source}")]
+    Ground {
+        /// The file or the embedded name.
+        origin: String,
+        /// Where the ground stands; empty for that of the scenario itself.
+        of: &'static str,
+        /// What is wrong and what to do.
+        source: GroundError,
     },
     /// A course cannot be built or does not fit.
     #[error("{origin}: {field}: {message}")]
@@ -157,7 +168,10 @@ impl Check<'_> {
         self.within("sample_time_s", s.sample_time_s, 0.001, 0.1)?;
         self.within("duration_s", s.duration_s, s.sample_time_s, 3600.0)?;
         self.within("speed_reference_kmh", s.speed_reference_kmh, 10.0, 250.0)?;
-        self.within("ground.friction", s.ground.friction, 0.01, 1.5)?;
+        self.ground("", s.ground.check())?;
+        if let Some(ground) = &s.recording.ground {
+            self.ground("recording.", ground.check())?;
+        }
         let bounds = &s.bounds;
         self.range("bounds.steering_wheel_deg", bounds.steering_wheel_deg, 0.0)?;
         self.range(
@@ -215,6 +229,7 @@ impl Check<'_> {
             recording.target_speed_kmh,
         )?;
         self.sensors(s)?;
+        self.grounds_on_courses(s)?;
         s.driver.check().map_err(|e| ScenarioError::Course {
             origin: self.origin.to_owned(),
             field: "driver",
@@ -334,6 +349,37 @@ impl Check<'_> {
                 other => self.out_of_range(&identification, other.to_string(), "as it says"),
             }
         })
+    }
+
+    fn ground(
+        &self,
+        of: &'static str,
+        checked: Result<(), GroundError>,
+    ) -> Result<(), ScenarioError> {
+        checked.map_err(|source| ScenarioError::Ground {
+            origin: self.origin.to_owned(),
+            of,
+            source,
+        })
+    }
+
+    /// Whether all that the grounds hold lies on their courses, which are known to be good.
+    fn grounds_on_courses(&self, s: &Scenario) -> Result<(), ScenarioError> {
+        let of_recording = if s.recording.ground.is_some() {
+            "recording."
+        } else {
+            "recording.course has no [recording.ground] of its own: "
+        };
+        let both = [
+            ("", &s.ground, &s.course),
+            (of_recording, s.recording_ground(), &s.recording.course),
+        ];
+        for (of, ground, course) in both {
+            if let Ok(course) = Course::new(course) {
+                self.ground(of, ground.check_on(&course))?;
+            }
+        }
+        Ok(())
     }
 
     fn count(&self, field: &str, count: usize) -> Result<(), ScenarioError> {

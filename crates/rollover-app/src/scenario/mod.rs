@@ -10,6 +10,7 @@ use serde::Deserialize;
 use vehicle_dyn::driver::DriverParameters;
 use vehicle_dyn::road::CourseDescription;
 use vehicle_dyn::sensors::{Channel, SensorDescription};
+use vehicle_dyn::terrain::GroundDescription;
 
 pub use controllers::{
     ControllerSettings, DataMatrix, DataSettings, LtrPenalty, ModelSettings, Prediction,
@@ -46,8 +47,8 @@ pub struct Scenario {
     pub sample_time_s: f64,
     /// Speed at the start and reference afterwards, km/h.
     pub speed_reference_kmh: f64,
-    /// The ground.
-    pub ground: Ground,
+    /// The ground: friction, and what makes it uneven or slippery here and there.
+    pub ground: GroundDescription,
     /// Sensors by channel; a channel without one is measured perfectly. Controllers read `ltr`, the
     /// driver [`DRIVER_CHANNELS`].
     #[serde(default)]
@@ -61,15 +62,8 @@ pub struct Scenario {
     /// How the controllers' data are recorded.
     pub recording: RecordingRecipe,
     /// Controllers by name. [`DRIVER`] is always there and is not listed.
+    #[serde(deserialize_with = "controller_file::controllers")]
     pub controllers: BTreeMap<String, ControllerSettings>,
-}
-
-/// The ground under the course.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Ground {
-    /// Friction coefficient of the road, dimensionless (the tyre's own factor is in the vehicle file).
-    pub friction: f64,
 }
 
 /// Bounds on the inputs.
@@ -96,6 +90,8 @@ pub struct RecordingRecipe {
     pub target_speed_noise_kmh: f64,
     /// The road of the recording.
     pub course: CourseDescription,
+    /// The ground of the recording; that of the scenario where it is absent.
+    pub ground: Option<GroundDescription>,
 }
 
 impl Scenario {
@@ -123,6 +119,12 @@ impl Scenario {
                 controller: name.to_owned(),
                 known: self.controller_names().join(", "),
             })
+    }
+
+    /// The ground under the recording's course.
+    #[must_use]
+    pub fn recording_ground(&self) -> &GroundDescription {
+        self.recording.ground.as_ref().unwrap_or(&self.ground)
     }
 
     /// Number of control steps of a run.

@@ -1,5 +1,6 @@
 //! The road built from its description.
 
+use super::crossing;
 use super::segment::{CourseDescription, RoadError, Segment};
 
 /// Spacing of the stored points, m. With five-point Gauss quadrature in between, the position is
@@ -92,7 +93,8 @@ impl Course {
     /// Builds the course from the origin along +x.
     ///
     /// # Errors
-    /// [`RoadError`] when a number of the description is out of range.
+    /// [`RoadError`] when a number of the description is out of range, or the road crosses itself or
+    /// touches itself within its width. A closed course may end where it starts.
     pub fn new(description: &CourseDescription) -> Result<Self, RoadError> {
         description.check()?;
         let mut builder = Builder {
@@ -130,11 +132,22 @@ impl Course {
             point: end,
             curvature_rate_per_m2: 0.0,
         });
-        Ok(Self {
+        let course = Self {
             description: description.clone(),
             knots: builder.knots,
             total_m,
-        })
+        };
+        course.check_crossings()?;
+        Ok(course)
+    }
+
+    fn check_crossings(&self) -> Result<(), RoadError> {
+        let places: Vec<(f64, f64, f64)> = self
+            .knots
+            .iter()
+            .map(|knot| (knot.point.station_m, knot.point.x_m, knot.point.y_m))
+            .collect();
+        crossing::check(self, &places)
     }
 
     /// The description the course was built from.

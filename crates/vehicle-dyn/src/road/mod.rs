@@ -5,6 +5,7 @@
 //! piece, so the heading is quadratic and the position a Fresnel integral.
 
 mod course;
+mod crossing;
 mod segment;
 
 pub use course::{Course, Location, RoadPoint};

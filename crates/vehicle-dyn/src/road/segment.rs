@@ -278,6 +278,24 @@ pub enum RoadError {
         /// Largest value allowed, m.
         high: f64,
     },
+    /// Two stretches of road overlap.
+    #[error(
+        "the road crosses or touches itself: at stations {first_m:.1} m (segment {first_segment}) and {second_m:.1} m (segment {second_segment}) its centre lines are {distance_m:.2} m apart, but it is {width_m} m wide; change a turn or a straight between them (a closed course must end within 0.5 m and 0.02 rad of its start)"
+    )]
+    CrossesItself {
+        /// Station on the earlier stretch, m.
+        first_m: f64,
+        /// Station on the later stretch, m.
+        second_m: f64,
+        /// Number of the segment at the first station, from 1.
+        first_segment: usize,
+        /// Number of the segment at the second station, from 1.
+        second_segment: usize,
+        /// Distance of the centre lines there, m.
+        distance_m: f64,
+        /// Width of the road, m.
+        width_m: f64,
+    },
     /// Total length out of range.
     #[error("the course is {total_m} m long: must be in (0, 1e5] m")]
     Length {
