@@ -45,6 +45,9 @@ pub struct Observation {
     pub wheel_loads_n: [f64; 4],
     /// Wheel travel from the design height, bump positive, m.
     pub wheel_travel_m: [f64; 4],
+    /// Gap between the lowest point of each tyre and the ground, along the ground normal, m; zero
+    /// for a wheel on the ground.
+    pub wheel_clearance_m: [f64; 4],
     /// Spin of each wheel, rad/s.
     pub wheel_spin_rad_s: [f64; 4],
     /// Load transfer ratio of the paper, `(Fz,R − Fz,L)/(m g)` (no unit).
@@ -70,6 +73,14 @@ impl Observation {
     #[must_use]
     pub fn wheels_lifted(&self) -> [bool; 4] {
         self.wheel_loads_n.map(|load| load <= 0.0)
+    }
+
+    /// Height that both wheels of one side have at least, on the side where it is larger, m; zero
+    /// while each side has a wheel on the ground.
+    #[must_use]
+    pub fn pair_clearance_m(&self) -> f64 {
+        let [front_left, front_right, rear_left, rear_right] = self.wheel_clearance_m;
+        front_left.min(rear_left).max(front_right.min(rear_right))
     }
 
     /// Whether both wheels of one side are off the ground.

@@ -6,6 +6,7 @@ use super::dynamics::HeldInput;
 use super::{Observation, Simulation};
 use crate::chassis::sum_corners;
 use crate::metrics;
+use crate::wheels::Contact;
 
 /// Speed below which the sideslip angle is reported as zero, m/s.
 const SIDESLIP_SPEED_M_S: f64 = 1.0;
@@ -56,10 +57,25 @@ impl Simulation {
             road_wheel_rad: dynamics.steering.road_wheel_rad(state.steering[0]),
             wheel_loads_n: loads,
             wheel_travel_m: state.travel_m,
+            wheel_clearance_m: [0, 1, 2, 3].map(|i| self.clearance_m(&contacts[i], i)),
             wheel_spin_rad_s: state.spin_rad_s,
             ltr: metrics::load_transfer_ratio(&loads, dynamics.total_mass_kg),
             ltr_of_sum: metrics::load_transfer_of_sum(&loads),
         }
+    }
+
+    /// Gap under the lowest point of wheel `i` along the ground normal, m.
+    fn clearance_m(&self, contact: &Contact, i: usize) -> f64 {
+        if contact.deflection_m >= 0.0 {
+            return 0.0;
+        }
+        let rotation = self.state.rotation();
+        let hub = self.state.position_m + rotation * self.hub_m(i);
+        let normal = self.terrain.ground(hub.x, hub.y).normal();
+        // The arm runs in the disc's plane: to the ground its length is the radius and the gap.
+        let arm = rotation * contact.arm_m;
+        let share = -contact.deflection_m / arm.norm().max(f64::MIN_POSITIVE);
+        -arm.dot(&normal) * share
     }
 
     /// Position (m) and velocity (m/s) of the whole vehicle's CG in world axes.
