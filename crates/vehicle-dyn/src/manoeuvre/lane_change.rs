@@ -75,6 +75,9 @@ pub struct LaneChangeDriver {
     pub handwheel_rate_limit_deg_per_s: f64,
     /// How far before a lane's end the path begins to leave its middle, m.
     pub path_lead_m: f64,
+    /// By how much of the room beside the vehicle the path keeps to the side that it comes from (no
+    /// unit); 0 is the middle of the lanes.
+    pub path_inside_share: f64,
 }
 
 impl LaneChangeDriver {
@@ -164,6 +167,12 @@ impl LaneChange {
                 "deg/s",
             ),
             ("driver.path_lead_m", driver.path_lead_m, [0.0, 50.0], "m"),
+            (
+                "driver.path_inside_share",
+                driver.path_inside_share,
+                [0.0, 1.0],
+                "",
+            ),
         ] {
             within(field, value, range, unit)?;
         }
@@ -200,7 +209,11 @@ impl LaneChange {
         let mut curves = Vec::new();
         for (index, (direction, sign)) in DIRECTIONS.into_iter().enumerate() {
             let track = Track::new(&self.lanes, width, APPROACH_M, self.cone_radius_m, sign);
-            let course = track.path(self.driver.path_lead_m, RUN_OUT_M)?;
+            let course = track.path(
+                self.driver.path_lead_m,
+                self.driver.path_inside_share,
+                RUN_OUT_M,
+            )?;
             curves.extend(outline_curves(direction, &track, &course));
             let setup = Setup {
                 direction,
@@ -306,7 +319,9 @@ impl LaneChange {
         let mut monitor = TrackMonitor::new(&setup.track, bench.vehicle, &self.outline);
         let end_m = setup.track.end_m() + END_AFTER_M;
         let longest_s = PATIENCE * end_m / speed;
-        let (mut next_decision_s, mut angle) = (0.0, 0.0);
+        let mut next_decision_s = 0.0;
+        // Between two decisions the hands move evenly: from one angle to the next, rad.
+        let mut hands = [0.0_f64; 2];
         let (mut off_path_m, mut entry_speed) = (0.0_f64, None);
         let mut plan = |seen: &Observation, tick_s: f64| -> Option<Command> {
             monitor.observe(seen);
@@ -320,7 +335,7 @@ impl LaneChange {
             // Half a tick less, so that rounding does not shift a decision.
             if seen.time_s >= next_decision_s - 0.5 * tick_s {
                 let action = driver.step(&setup.course, seen, DRIVER_TICK_S);
-                angle = action.handwheel_deg * DEGREE;
+                hands = [hands[1], action.handwheel_deg * DEGREE];
                 off_path_m = off_path_m.max(action.location.lateral_offset_m.abs());
                 next_decision_s += DRIVER_TICK_S;
             }
@@ -330,7 +345,9 @@ impl LaneChange {
             } else {
                 LongitudinalDemand::TargetSpeed(speed)
             };
-            Some(steer(angle, pedals))
+            let left =
+                ((next_decision_s - seen.time_s - 0.5 * tick_s) / DRIVER_TICK_S).clamp(0.0, 1.0);
+            Some(steer(hands[1] + (hands[0] - hands[1]) * left, pedals))
         };
         let trace = bench.drive(&name, speed, &mut plan)?;
         let at_end = trace.rows.last().is_some_and(|row| row.seen.x_m > end_m);

@@ -123,6 +123,14 @@ impl Lane {
     fn middle_m(&self) -> f64 {
         0.5 * (self.right_m + self.left_m)
     }
+
+    /// Where a path runs that leaves the middle towards `other_m` by `share` of the room that a vehicle
+    /// of `vehicle_width_m` has there, m.
+    fn aim_m(&self, other_m: f64, share: f64, vehicle_width_m: f64) -> f64 {
+        let room = (0.5 * (self.left_m - self.right_m - vehicle_width_m)).max(0.0);
+        let way = other_m - self.middle_m();
+        self.middle_m() + way.clamp(-share * room, share * room)
+    }
 }
 
 /// The lanes with their cones.
@@ -134,6 +142,8 @@ pub struct Track {
     pub cones: Vec<[f64; 2]>,
     /// Radius of a cone's foot, m. It touches its lane from outside.
     pub cone_radius_m: f64,
+    /// Width of the vehicle that the lanes are for, m.
+    pub vehicle_width_m: f64,
 }
 
 impl Track {
@@ -154,6 +164,7 @@ impl Track {
             lanes: Vec::new(),
             cones: Vec::new(),
             cone_radius_m,
+            vehicle_width_m,
         };
         for description in descriptions {
             let width = description.width_m(vehicle_width_m);
@@ -187,23 +198,31 @@ impl Track {
         self.lanes.last().map_or(0.0, |lane| lane.end_m)
     }
 
-    /// The smooth path through the middles of the lanes, from the origin along x. It begins to
-    /// change lanes `lead_m` before a lane ends and is done `lead_m` after the next has begun.
+    /// A smooth path through the lanes, from the origin along x. It begins to change lanes `lead_m`
+    /// before a lane ends and is done `lead_m` after the next has begun. It runs through the middle of
+    /// the first lane; in the others it keeps to the side it comes from by `inside_share` of the room
+    /// beside the vehicle, so that 0 is the middle and 1 touches the cones.
     ///
     /// # Errors
     /// [`RoadError`] when the lanes leave too little room.
-    pub fn path(&self, lead_m: f64, run_out_m: f64) -> Result<Course, RoadError> {
+    pub fn path(
+        &self,
+        lead_m: f64,
+        inside_share: f64,
+        run_out_m: f64,
+    ) -> Result<Course, RoadError> {
         let width_m = 1.0;
         let mut segments = Vec::new();
-        let mut x = 0.0;
+        let (mut x, mut y) = (0.0, 0.0);
         for pair in self.lanes.windows(2) {
             let begin = (pair[0].end_m - lead_m).max(x);
             segments.push(Segment::Straight {
                 straight_m: begin - x,
             });
             x = (pair[1].begin_m + lead_m).max(begin + 4.0);
-            let across = pair[1].middle_m() - pair[0].middle_m();
-            segments.extend(lane_change(x - begin, across, width_m)?);
+            let aim = pair[1].aim_m(pair[0].middle_m(), inside_share, self.vehicle_width_m);
+            segments.extend(lane_change(x - begin, aim - y, width_m)?);
+            y = aim;
         }
         segments.push(Segment::Straight {
             straight_m: (self.end_m() - x).max(0.0) + run_out_m,

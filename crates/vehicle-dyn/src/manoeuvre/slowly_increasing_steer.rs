@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::bench::{Bench, DIRECTIONS, steer};
 use super::range::{ordered, within};
 use super::report::{Curve, Figure, Verdict};
-use super::signal::linear_fit;
+use super::signal::{Line, linear_fit};
 use super::trace::Trace;
 use super::{Conclusion, ManoeuvreError};
 use crate::simulation::{LongitudinalDemand, Observation};
@@ -98,7 +98,7 @@ impl SlowlyIncreasingSteer {
         for (index, (direction, sign)) in DIRECTIONS.into_iter().enumerate() {
             let name = format!("slowly-increasing-steer-{direction}");
             let trace = self.drive(bench, &name, sign)?;
-            let line = linear_fit(&self.points(&trace, sign)).filter(|line| line.points >= 3);
+            let line = self.line(&trace, sign);
             let reached = trace.extremes.lateral_acceleration_m_s2 / GRAVITY_M_S2;
             let angle = line.map(|line| line.at(self.target_lateral_acceleration_g));
             let slope = line.map(|line| line.slope);
@@ -189,16 +189,19 @@ impl SlowlyIncreasingSteer {
         bench.drive(name, speed, &mut plan)
     }
 
-    /// Points (lateral acceleration in g, handwheel in deg) within the range of the line, up to the
-    /// first that is beyond it.
-    fn points(&self, trace: &Trace, sign: f64) -> Vec<(f64, f64)> {
-        trace
+    /// The line of one direction from its trace alone: handwheel angle in deg over lateral
+    /// acceleration in g, through the rows within the range up to the first beyond it. `None` for
+    /// fewer than three rows.
+    #[must_use]
+    pub fn line(&self, trace: &Trace, sign: f64) -> Option<Line> {
+        let points: Vec<(f64, f64)> = trace
             .rows
             .iter()
             .map(|row| row_point(&row.seen, sign))
             .take_while(|point| point.0 <= self.regression_to_g)
             .filter(|point| point.0 >= self.regression_from_g)
-            .collect()
+            .collect();
+        linear_fit(&points).filter(|line| line.points >= 3)
     }
 }
 

@@ -51,7 +51,8 @@ pub struct Trace {
 
 impl Trace {
     /// An empty trace.
-    pub(super) fn new(name: &str) -> Self {
+    #[must_use]
+    pub fn new(name: &str) -> Self {
         Self {
             name: name.to_owned(),
             rows: Vec::new(),
@@ -60,8 +61,9 @@ impl Trace {
         }
     }
 
-    /// Takes note of an instant. Returns whether the run goes on.
-    pub(super) fn note(&mut self, seen: &Observation, two_wheel_lift_m: f64) -> bool {
+    /// Takes note of an instant for extremes and ending; does not store a row. Returns whether the run
+    /// goes on.
+    pub fn note(&mut self, seen: &Observation, two_wheel_lift_m: f64) -> bool {
         let worst = &mut self.extremes;
         let time = seen.time_s;
         worst.ltr = worst.ltr.max(seen.ltr.abs());
