@@ -16,9 +16,9 @@ fn sweep() {
     long.mass.sprung_pitch_inertia_kg_m2 = 3500.0;
     for name in ["iso-3888-2", "iso-3888-1"] {
         for preview in if name == "iso-3888-1" {
-            [0.5, 0.6, 0.7]
+            vec![0.5, 0.6, 0.7]
         } else {
-            [0.5, 0.6, 0.7]
+            vec![0.5, 0.6, 0.7]
         } {
             for (pg, dg, ins) in [
                 (1.4, 0.0, 0.25),
@@ -29,9 +29,9 @@ fn sweep() {
                 (1.8, 0.5, 0.5),
             ] {
                 for lead in if name == "iso-3888-1" {
-                    [5.0, 8.0]
+                    vec![5.0, 8.0]
                 } else {
-                    [1.0, 2.0, 3.0]
+                    vec![1.0, 2.0, 3.0]
                 } {
                     let mut file = manoeuvre::find(name).unwrap();
                     if let Manoeuvre::LaneChange(l) = &mut file.manoeuvre {
