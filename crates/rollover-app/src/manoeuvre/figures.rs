@@ -1,6 +1,7 @@
 //! Pictures of a manoeuvre: signals over time, and what the manoeuvre shows over something else.
 
 use anyhow::Result;
+use plotters::style::Color;
 use vehicle_dyn::manoeuvre::{Curve, Performed, Trace, TraceRow};
 use vehicle_dyn::metrics::Outcome;
 use vehicle_dyn::units::{DEGREE, GRAVITY_M_S2};
