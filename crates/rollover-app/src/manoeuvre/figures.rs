@@ -21,7 +21,7 @@ pub(super) struct Figure {
 
 /// Runs in one picture: as many as a legend and the colours can tell apart.
 const MOST_RUNS: usize = 6;
-const WIDE: (u32, u32) = (920, 360);
+const WIDE: (u32, u32) = (920, 400);
 /// Largest |LTR| shown: a landing may send it far beyond what matters.
 const LTR_SHOWN: f64 = 2.0;
 /// Points of one line: more than the width of a picture shows nothing more.
@@ -281,7 +281,7 @@ fn top_view(group: &[&Curve], runs: &[&Trace]) -> Result<Figure> {
 /// A range of y with room for the legend above.
 fn range(series: &[Series<'_>]) -> (f64, f64) {
     let (low, high) = padded(series.iter().flat_map(|s| &s.points).map(|p| p.1));
-    let legend = 0.09 * series.iter().filter(|s| !s.name.is_empty()).count() as f64;
+    let legend = 0.11 * series.iter().filter(|s| !s.name.is_empty()).count() as f64;
     (low, high + legend * (high - low))
 }
 

@@ -92,7 +92,10 @@ impl<'a> Bench<'a> {
 
     /// A vehicle rolling straight along x at `speed_m_s` from the origin.
     pub fn rolling(&mut self, run: &str, speed_m_s: f64) -> Result<Simulation, ManoeuvreError> {
-        if let Some((_, simulation)) = self.rolling.as_ref().filter(|known| known.0 == speed_m_s) {
+        let known = self.rolling.as_ref();
+        // The very same speed, to the bit.
+        let same = known.filter(|known| known.0.to_bits() == speed_m_s.to_bits());
+        if let Some((_, simulation)) = same {
             return Ok(simulation.clone());
         }
         let pose = InitialPose {

@@ -323,9 +323,10 @@ fn points(trace: &Trace, sign: f64, from_s: f64, value: fn(&TraceRow) -> f64) ->
 /// Mean point of each class of lateral acceleration, in driving order.
 fn classes(points: &[(f64, f64)]) -> Vec<[f64; 2]> {
     let mut curve = Vec::new();
-    for group in
-        points.chunk_by(|a, b| (a.0 / CURVE_STEP_G).floor() == (b.0 / CURVE_STEP_G).floor())
-    {
+    // Lateral accelerations of a few g: the class fits.
+    #[allow(clippy::cast_possible_truncation)]
+    let class = |point: &(f64, f64)| (point.0 / CURVE_STEP_G).floor() as i64;
+    for group in points.chunk_by(|a, b| class(a) == class(b)) {
         let count = group.len() as f64;
         let sum = group
             .iter()

@@ -32,8 +32,8 @@ pub(super) fn rising(
     for (index, value) in values.iter().enumerate() {
         within(&format!("{field}[{index}]"), *value, [low, high], unit)?;
     }
-    if let Some(pair) = values.windows(2).find(|pair| pair[0] >= pair[1]) {
-        let found = format!("{}, {}", pair[0], pair[1]);
+    if let Some([before, after]) = values.windows(2).find(|pair| pair[0] >= pair[1]) {
+        let found = format!("{before}, {after}");
         return Err(refused(field, &found, "in rising order"));
     }
     Ok(())

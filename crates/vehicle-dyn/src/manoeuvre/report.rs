@@ -333,7 +333,7 @@ impl fmt::Display for Verdict {
             Some(false) => "failed",
             None => "no verdict",
         };
-        write!(formatter, "{passed}: {}", self.rule)
+        write!(formatter, "{passed}; the rule: {}", self.rule)
     }
 }
 

@@ -128,7 +128,7 @@ impl SlowlyIncreasingSteer {
         }
         let slope = 0.5 * (slopes[0] + slopes[1]);
         let speed = self.speed_kmh * KMH;
-        let wheelbase = self.wheelbase_m(bench);
+        let wheelbase = bench.vehicle.derived().wheelbase_m;
         let ackermann = wheelbase * GRAVITY_M_S2 / (speed * speed) / DEGREE;
         Ok(SteeringScale {
             angle_deg: (0.5 * (angles[0] + angles[1]) * 10.0).round() / 10.0,
@@ -163,10 +163,6 @@ impl SlowlyIncreasingSteer {
                 rule: "slowly increasing steer measures and has no limit".into(),
             },
         })
-    }
-
-    fn wheelbase_m(&self, bench: &Bench<'_>) -> f64 {
-        bench.vehicle.derived().wheelbase_m
     }
 
     fn angle_name(&self) -> String {

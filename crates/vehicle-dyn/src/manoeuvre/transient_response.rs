@@ -388,7 +388,10 @@ impl FrequencyResponse {
     }
 }
 
-const FREQUENCY_RESPONSES: [(&str, &str, fn(&TraceRow) -> f64); 4] = [
+/// A response as the frequency response has it: name, unit of the gain, value of a row.
+type Output = (&'static str, &'static str, fn(&TraceRow) -> f64);
+
+const FREQUENCY_RESPONSES: [Output; 4] = [
     ("yaw rate", "1/s", |row| row.seen.yaw_rate_rad_s),
     ("lateral acceleration", "(m/s²)/rad", |row| {
         row.seen.lateral_acceleration_m_s2
