@@ -28,8 +28,9 @@ pub(super) fn prepare(folder: &Path) -> Result<()> {
     remove(&folder.join(PAGE))?;
     remove(&folder.join(SUMMARY))?;
     for name in names_in(folder)? {
-        if name.starts_with(PICTURE) && name.ends_with(".svg") {
-            remove(&folder.join(name))?;
+        let stem = name.strip_suffix(".svg");
+        if stem.is_some_and(|stem| stem.starts_with(PICTURE)) {
+            remove(&folder.join(&name))?;
         }
     }
     let runs = folder.join(RUNS);

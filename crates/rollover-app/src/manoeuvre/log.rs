@@ -100,6 +100,6 @@ pub(super) fn write(out: &Path, trace: &Trace) -> Result<()> {
     for row in &trace.rows {
         csv.serialize(ManoeuvreLogRow::from(row))?;
     }
-    let bytes = csv.into_inner().map_err(|error| error.into_error())?;
+    let bytes = csv.into_inner().map_err(csv::IntoInnerError::into_error)?;
     write_whole(&folder.join(LOG), &String::from_utf8(bytes)?)
 }
