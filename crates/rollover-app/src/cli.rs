@@ -26,6 +26,9 @@ pub enum Command {
     Record(RecordArgs),
     /// Identifies a linear model from recordings: model file, report, figures.
     Identify(IdentifyArgs),
+    /// A standard manoeuvre with a vehicle: figures of merit, logs, pictures.
+    #[command(after_help = crate::manoeuvre::help())]
+    Manoeuvre(ManoeuvreArgs),
 }
 
 /// Arguments of `paper`.
@@ -158,6 +161,22 @@ pub struct IdentifyArgs {
     /// Folder for the results.
     #[arg(long, default_value = "out/identify", value_name = "DIR")]
     pub out: PathBuf,
+    /// Print the report as JSON on standard output.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `manoeuvre`.
+#[derive(Debug, Args)]
+pub struct ManoeuvreArgs {
+    /// Name of a manoeuvre, or path of a manoeuvre file.
+    pub manoeuvre: String,
+    /// Vehicle file or name.
+    #[arg(long, default_value = "sedan", value_name = "VEHICLE")]
+    pub vehicle: String,
+    /// Folder for the results; by default `out/MANOEUVRE/VEHICLE`.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
     /// Print the report as JSON on standard output.
     #[arg(long)]
     pub json: bool,

@@ -7,13 +7,15 @@
 //!
 //! [`scenario`] says what is driven; [`record`] makes the data a controller works from;
 //! [`closed_loop`] runs one controller on one scenario and writes a [`run_log`]; [`campaign`]
-//! arranges runs; [`summary`] and [`report`] read logs only.
+//! arranges runs; [`summary`] and [`report`] read logs only. [`manoeuvre`] drives a standard manoeuvre
+//! without a controller.
 
 pub mod campaign;
 pub mod cli;
 pub mod closed_loop;
 pub mod identify;
 pub mod interrupt;
+pub mod manoeuvre;
 pub mod output;
 pub mod record;
 pub mod report;
@@ -37,5 +39,6 @@ pub fn execute(command: &cli::Command, interrupt: &Interrupt) -> Result<()> {
         cli::Command::Terrain(args) => terrain::command(args, interrupt),
         cli::Command::Record(args) => campaign::record_only(args, interrupt),
         cli::Command::Identify(args) => identify::identify(args, interrupt),
+        cli::Command::Manoeuvre(args) => manoeuvre::manoeuvre(args, interrupt),
     }
 }

@@ -10,6 +10,7 @@ use rollover_app::run_log::{self, LogRow};
 use rollover_app::scenario::{DRIVER, Scenario, load};
 use rollover_app::summary::{RunIdentity, Summary};
 use vehicle_dyn::parameters::VehicleParameters;
+use vehicle_dyn::terrain::Terrain;
 
 const SCENARIO: &str = include_str!("../../../scenarios/sedan-s1.toml");
 const CONTROLLER: &str = "rd-deepc-1";
@@ -59,6 +60,7 @@ fn drive(
         vehicle: &vehicle(scenario),
         speed_reference_kmh: scenario.speed_reference_kmh,
         seed,
+        terrain: Terrain::flat(scenario.ground.friction),
         controller,
     };
     run(order, log, &Interrupt::default(), || ())

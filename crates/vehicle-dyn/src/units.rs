@@ -3,6 +3,9 @@
 /// One kilometre per hour in m/s.
 pub const KMH: f64 = 1.0 / 3.6;
 
+/// One mile per hour in m/s.
+pub const MPH: f64 = 0.447_04;
+
 /// One degree in rad.
 pub const DEGREE: f64 = std::f64::consts::PI / 180.0;
 

@@ -83,6 +83,9 @@ pub struct Contact {
     /// Radial compression of the tyre, m; negative is the gap under a lifted wheel. Of twin tyres
     /// the larger one.
     pub deflection_m: f64,
+    /// Gap between the tyre's lowest point and the ground along the ground's normal, m; zero for a
+    /// wheel on the ground.
+    pub clearance_m: f64,
     /// Energy stored in the tyre's radial spring, J.
     pub elastic_j: f64,
     /// Force on the wheel in body axes, N.
@@ -142,6 +145,7 @@ impl Wheel {
         Contact {
             load_n: one.load_n + other.load_n,
             deflection_m: one.deflection_m.max(other.deflection_m),
+            clearance_m: one.clearance_m.min(other.clearance_m),
             elastic_j: one.elastic_j + other.elastic_j,
             force_n: one.force_n + other.force_n,
             tangential_n: one.tangential_n + other.tangential_n,
@@ -157,7 +161,8 @@ impl Wheel {
     fn tyre_contact(&self, motion: &WheelMotion, ground: &Ground, share: f64) -> Contact {
         let normal = motion.normal;
         let forward = motion.axis.cross(&normal);
-        let inverse_cos = 1.0 / forward.norm().max(LEAST_COS_CAMBER);
+        let cos_camber = forward.norm().max(LEAST_COS_CAMBER);
+        let inverse_cos = 1.0 / cos_camber;
         let sin_camber = motion.axis.dot(&normal);
         let forward = forward * inverse_cos;
         let left = normal.cross(&forward);
@@ -210,6 +215,7 @@ impl Wheel {
         Contact {
             load_n: load,
             deflection_m: deflection,
+            clearance_m: (-deflection).max(0.0) * cos_camber,
             elastic_j: share * self.radial.energy_j(deflection),
             force_n: force,
             tangential_n: tangential,

@@ -6,22 +6,22 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 
 /// One line of a chart.
-pub(super) struct Series<'a> {
+pub(crate) struct Series<'a> {
     /// Name in the legend; an empty one keeps the line out of the legend.
-    pub(super) name: &'a str,
-    pub(super) style: ShapeStyle,
-    pub(super) points: Vec<(f64, f64)>,
+    pub(crate) name: &'a str,
+    pub(crate) style: ShapeStyle,
+    pub(crate) points: Vec<(f64, f64)>,
     /// Whether a cross marks the last point: the run ended early.
-    pub(super) cross: bool,
+    pub(crate) cross: bool,
 }
 
 /// What the axes show.
-pub(super) struct Axes<'a> {
-    pub(super) title: &'a str,
-    pub(super) x_label: &'a str,
-    pub(super) y_label: &'a str,
-    pub(super) x: (f64, f64),
-    pub(super) y: (f64, f64),
+pub(crate) struct Axes<'a> {
+    pub(crate) title: &'a str,
+    pub(crate) x_label: &'a str,
+    pub(crate) y_label: &'a str,
+    pub(crate) x: (f64, f64),
+    pub(crate) y: (f64, f64),
 }
 
 /// Colour-blind safe hues (Okabe and Ito), dark enough on white.
@@ -40,12 +40,12 @@ const CROSS_SIZE: i32 = 6;
 pub(crate) const FONT: &str = "Helvetica, Arial, sans-serif";
 
 /// Colour of the `index`-th run of a figure.
-pub(super) fn run_colour(index: usize) -> RGBColor {
+pub(crate) fn run_colour(index: usize) -> RGBColor {
     PALETTE[index % PALETTE.len()]
 }
 
 /// Thin grey line for limits and edges.
-pub(super) fn limit_style() -> ShapeStyle {
+pub(crate) fn limit_style() -> ShapeStyle {
     RGBColor(120, 125, 131).stroke_width(1)
 }
 
@@ -59,12 +59,12 @@ pub(crate) fn tick(value: f64) -> String {
 
 /// Width of the `index`-th run's line. Earlier runs lie below and are wider, so that runs which
 /// coincide are all seen.
-pub(super) fn run_width(index: usize) -> u32 {
+pub(crate) fn run_width(index: usize) -> u32 {
     [4, 3, 2, 2].get(index).copied().unwrap_or(1)
 }
 
 /// Draws series over common axes and returns the SVG.
-pub(super) fn line_chart(
+pub(crate) fn line_chart(
     size: (u32, u32),
     axes: &Axes<'_>,
     series: &[Series<'_>],

@@ -1,6 +1,6 @@
 //! Figures and pages drawn from run logs. Nothing here simulates or controls.
 
-mod chart;
+pub(crate) mod chart;
 mod figures;
 mod page;
 mod table;

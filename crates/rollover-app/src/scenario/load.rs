@@ -141,6 +141,11 @@ fn unknown(name: &str) -> ScenarioError {
     let suggestion = closest
         .filter(|c| strsim::jaro_winkler(c, name) > 0.75)
         .map_or_else(String::new, |c| format!(" (did you mean `{c}`?)"));
+    let suggestion = if vehicle_dyn::manoeuvre::names().contains(&name) {
+        format!(" (it is a manoeuvre: `rollover-app manoeuvre {name}`)")
+    } else {
+        suggestion
+    };
     ScenarioError::Unknown {
         name: name.to_owned(),
         suggestion,

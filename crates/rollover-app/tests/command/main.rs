@@ -5,6 +5,7 @@ mod identify;
 mod identify_bad_input;
 mod interruption;
 mod linear_mpc;
+mod manoeuvre;
 mod reproducible;
 mod terrain;
 

@@ -44,10 +44,11 @@ pub struct Observation {
     pub road_wheel_rad: f64,
     /// Load of each wheel along the ground normal, N.
     pub wheel_loads_n: [f64; 4],
-    /// Radial gap between each tyre and the ground, m; 0 for a wheel that touches it.
-    pub wheel_clearance_m: [f64; 4],
     /// Wheel travel from the design height, bump positive, m.
     pub wheel_travel_m: [f64; 4],
+    /// Gap between the lowest point of each tyre and the ground, along the ground normal, m; zero
+    /// for a wheel on the ground.
+    pub wheel_clearance_m: [f64; 4],
     /// Spin of each wheel, rad/s.
     pub wheel_spin_rad_s: [f64; 4],
     /// Load transfer ratio of the paper, `(Fz,R − Fz,L)/(m g)` (no unit).
@@ -75,6 +76,13 @@ impl Observation {
         self.wheel_loads_n.map(|load| load <= 0.0)
     }
 
+    /// Height that both wheels of one side have at least, on the side where it is larger, m; zero
+    /// while each side has a wheel on the ground.
+    #[must_use]
+    pub fn pair_clearance_m(&self) -> f64 {
+        metrics::two_wheel_clearance_m(&self.wheel_clearance_m)
+    }
+
     /// Whether both wheels of one side carry nothing. A wheel on rough ground may carry nothing
     /// for a moment; [`Self::two_wheel_lift_above`] asks for a height.
     #[must_use]
@@ -86,6 +94,6 @@ impl Observation {
     /// for [`metrics::NHTSA_TWO_WHEEL_LIFT_M`].
     #[must_use]
     pub fn two_wheel_lift_above(&self, height_m: f64) -> bool {
-        metrics::two_wheel_clearance_m(&self.wheel_clearance_m) > height_m
+        self.pair_clearance_m() > height_m
     }
 }
