@@ -8,14 +8,19 @@ mod check;
 mod derived;
 mod error;
 mod read;
+pub mod schema;
 
+pub use check::{Field, Interval, fields};
 pub use derived::DerivedFigures;
 pub use error::ParameterError;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::driver::DriverParameters;
+
 /// One vehicle, as read from a TOML file. See `vehicles/README.md` for every field.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct VehicleParameters {
     /// Short name for logs and tables; no code depends on it.
@@ -38,10 +43,14 @@ pub struct VehicleParameters {
     pub powertrain: PowertrainParameters,
     /// Aerodynamic drag.
     pub aerodynamics: AerodynamicParameters,
+    /// A driver who suits the vehicle: taken where a scenario names none, and where a command swaps
+    /// the scenario's vehicle for this one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub driver: Option<DriverParameters>,
 }
 
 /// Masses and inertias of the sprung body and the wheel assemblies.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MassParameters {
     /// Mass carried by the springs, load included, kg.
@@ -63,7 +72,7 @@ pub struct MassParameters {
 }
 
 /// Axle positions, tracks and roll centres.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GeometryParameters {
     /// Distance from the centre of gravity of the sprung mass to the front axle, m.
@@ -81,7 +90,7 @@ pub struct GeometryParameters {
 }
 
 /// Suspension of both axles. All rates act at the wheel centre, so no motion ratio is needed.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SuspensionParameters {
     /// Wheel rate of one front spring, N/m.
@@ -121,7 +130,7 @@ pub struct SuspensionParameters {
 }
 
 /// Where the springs and dampers of a solid axle stand.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SolidAxleParameters {
     /// Distance between the left and the right spring, m.
@@ -131,7 +140,7 @@ pub struct SolidAxleParameters {
 }
 
 /// Tyres: the paper's combined-slip Magic Formula (eq. magic) with its constants as data.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TyreParameters {
     /// Radius of the unloaded tyre, m.
@@ -179,7 +188,7 @@ pub struct TyreParameters {
 }
 
 /// Rotational inertias of the wheels.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WheelParameters {
     /// Inertia that resists spinning up one front wheel, driveline included, kg m².
@@ -193,7 +202,7 @@ pub struct WheelParameters {
 }
 
 /// Steering system: both front wheels turn by the handwheel angle over the ratio.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SteeringParameters {
     /// Handwheel angle over road-wheel angle (no unit).
@@ -209,7 +218,7 @@ pub struct SteeringParameters {
 }
 
 /// Engine, brakes and the controller that holds the target speed.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PowertrainParameters {
     /// Largest engine power at the wheels, W.
@@ -236,7 +245,7 @@ pub struct PowertrainParameters {
 }
 
 /// Aerodynamic drag, against the velocity, applied at the centre of gravity of the sprung mass.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AerodynamicParameters {
     /// Drag coefficient times frontal area, m².
