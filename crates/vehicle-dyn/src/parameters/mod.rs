@@ -11,7 +11,7 @@ mod read;
 pub mod schema;
 
 pub use check::{Field, Interval, fields};
-pub use derived::DerivedFigures;
+pub use derived::{CorneringFigures, DerivedFigures, Figure, Mode, NaturalModes};
 pub use error::ParameterError;
 
 use schemars::JsonSchema;
