@@ -35,6 +35,8 @@ pub(super) struct Axle {
     pub drop_m: f64,
     /// Height of the wheel centre above the point about which it leans, m.
     pub lean_radius_m: f64,
+    /// Angular momentum of one spinning wheel over the vehicle's speed, kg m.
+    pub spin_kg_m: f64,
 }
 
 pub(super) fn axles(vehicle: &VehicleParameters, figures: &DerivedFigures) -> [Axle; 2] {
@@ -53,6 +55,7 @@ pub(super) fn axles(vehicle: &VehicleParameters, figures: &DerivedFigures) -> [A
         anti_roll_nm_per_rad: suspension.anti_roll_front_nm_per_rad,
         camber_gain_rad_per_m: suspension.camber_gain_front_rad_per_m,
         roll_centre_m: geometry.roll_centre_height_front_m,
+        gyroscopic_kg_m2: vehicle.wheel.gyroscopic_inertia_front_kg_m2,
         solid: suspension.solid_axle_front.as_ref(),
     };
     let rear = Side {
@@ -68,6 +71,7 @@ pub(super) fn axles(vehicle: &VehicleParameters, figures: &DerivedFigures) -> [A
         anti_roll_nm_per_rad: suspension.anti_roll_rear_nm_per_rad,
         camber_gain_rad_per_m: suspension.camber_gain_rear_rad_per_m,
         roll_centre_m: geometry.roll_centre_height_rear_m,
+        gyroscopic_kg_m2: vehicle.wheel.gyroscopic_inertia_rear_kg_m2,
         solid: suspension.solid_axle_rear.as_ref(),
     };
     [front.axle(vehicle), rear.axle(vehicle)]
@@ -87,6 +91,7 @@ struct Side<'a> {
     anti_roll_nm_per_rad: f64,
     camber_gain_rad_per_m: f64,
     roll_centre_m: f64,
+    gyroscopic_kg_m2: f64,
     solid: Option<&'a SolidAxleParameters>,
 }
 
@@ -122,6 +127,8 @@ impl Side<'_> {
             jacking_slope: self.roll_centre_m / half_track,
             drop_m: vehicle.mass.sprung_cg_height_m - hub,
             lean_radius_m: hub - tyre.crown_radius_m,
+            spin_kg_m: self.gyroscopic_kg_m2
+                / (tyre.unloaded_radius_m - self.load_n / self.tyre_n_per_m / 3.0),
         }
     }
 }
@@ -135,16 +142,30 @@ pub(super) fn add_square(matrix: &mut Matrix3<f64>, value: f64, axle: usize, at:
     matrix[(index, index)] += value * at[1] * at[1];
 }
 
+/// How an axle stands on its wheels in a turn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Stand {
+    /// Whether the inner wheel is off the ground: a constant load then stands on the outer one.
+    pub lifted: bool,
+    /// How many wheels stand on both of their twin tyres: 2 at rest.
+    pub twins: f64,
+}
+
+impl Stand {
+    pub const AT_REST: Self = Self {
+        lifted: false,
+        twins: 2.0,
+    };
+}
+
 /// Stiffness in roll over `(φ, d_front, d_rear)`: second derivative of the energy in tyres, springs,
-/// bars and gravity. The inner wheel of a `lifted` axle is off the ground: a constant load then
-/// stands on the outer one.
-pub(super) fn roll_stiffness(axles: &[Axle; 2], lifted: [bool; 2]) -> Matrix3<f64> {
+/// bars and gravity.
+pub(super) fn roll_stiffness(axles: &[Axle; 2], stands: [Stand; 2]) -> Matrix3<f64> {
     let mut stiffness = Matrix3::zeros();
-    for (i, axle) in axles.iter().enumerate() {
+    for (i, (axle, stand)) in axles.iter().zip(stands).enumerate() {
         let lean = [1.0, axle.lean_per_m];
-        let tyres = if lifted[i] { 1.0 } else { 2.0 };
-        let twins = tyres * axle.tyre_n_per_m * axle.half_twin_spacing_m.powi(2);
-        if !lifted[i] {
+        let twins = stand.twins * axle.tyre_n_per_m * axle.half_twin_spacing_m.powi(2);
+        if !stand.lifted {
             let press = [axle.half_track_m, 1.0];
             add_square(&mut stiffness, 2.0 * axle.tyre_n_per_m, i, press);
         }

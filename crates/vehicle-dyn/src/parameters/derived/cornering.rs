@@ -6,11 +6,11 @@
 //! weight is), inertia, links and the sideways shift of the contact patches by the compliance `c`:
 //!
 //! ```text
-//! Q_φ = Σ (F h_s − 2 m_u a (h_s − h_hub) + c F N)
+//! Q_φ = Σ (F h_s − 2 m_u a (h_s − h_hub) + c F N + 2 (I/r) a)
 //! Q_d = F h_rc/(T/2) + λ c F N
 //! ```
 //!
-//! and `K (φ, d) = Q` with the stiffness of tyres, springs, bars and gravity. All of it is linear,
+//! (`I/r`: what turns the axes of the spinning wheels with the yaw rate `a/v`) and `K (φ, d) = Q` with the stiffness of tyres, springs, bars and gravity. All of it is linear,
 //! but for the patch shift: with the share `τ` of its load transferred, an axle has
 //! `N = N₀ (1 + τ²)`, because the outer wheel carries more of both load and force.
 //!
@@ -18,12 +18,13 @@
 //! The gradient is the derivative at straight running: axle force over cornering stiffness at the
 //! static load, plus the slip that the camber thrust of the rolled wheels costs, front less rear
 //! (ISO 4138; Gillespie 1992, chapter 6). The loss of cornering stiffness by load transfer is of
-//! second order in the lateral acceleration, so it is not in it.
+//! second order in the lateral acceleration, so it is not in it. Nor is what the powertrain adds:
+//! drive forces at leaning wheels and a stiff differential.
 
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use super::axle::{Axle, axles, roll_stiffness};
+use super::axle::{Axle, Stand, axles, roll_stiffness};
 use crate::parameters::VehicleParameters;
 use crate::tyre::MagicFormula;
 use crate::units::{DEGREE, GRAVITY_M_S2};
@@ -74,7 +75,7 @@ impl VehicleParameters {
             .map(|arm| figures.total_mass_kg * arm / figures.wheelbase_m),
         };
         // Small enough to be linear, per m/s².
-        let at = turn.solve(&turn.load(1.0, [0.0; 2]), [false; 2]);
+        let at = turn.solve(&turn.load(1.0, [0.0; 2]), [Stand::AT_REST; 2]);
         let transfers = [0, 1].map(|i| 2.0 * turn.transfer_n(i, &at));
         let weight = figures.total_mass_kg * GRAVITY_M_S2;
         let [slip_front, slip_rear] = [0, 1].map(|i| {
@@ -131,17 +132,17 @@ impl Turn<'_> {
         for (i, axle) in self.axles.iter().enumerate() {
             let force = self.forces_n[i] * acceleration_m_s2;
             let shifted = compliance * force * axle.load_n * (1.0 + transferred[i].powi(2));
-            load[0] +=
-                force * height + shifted - 2.0 * axle.unsprung_kg * acceleration_m_s2 * axle.drop_m;
+            load[0] += force * height + shifted + 2.0 * axle.spin_kg_m * acceleration_m_s2
+                - 2.0 * axle.unsprung_kg * acceleration_m_s2 * axle.drop_m;
             load[1 + i] = force * axle.jacking_slope + axle.lean_per_m * shifted;
         }
         load
     }
 
-    fn solve(&self, load: &Vector3<f64>, lifted: [bool; 2]) -> Vector3<f64> {
+    fn solve(&self, load: &Vector3<f64>, stands: [Stand; 2]) -> Vector3<f64> {
         // A vehicle that passed the checks stands upright. One that falls over while an axle hangs in
         // the air is at its lift-off already.
-        roll_stiffness(self.axles, lifted)
+        roll_stiffness(self.axles, stands)
             .cholesky()
             .map_or_else(|| Vector3::repeat(f64::INFINITY), |root| root.solve(load))
     }
@@ -152,25 +153,40 @@ impl Turn<'_> {
         axle.tyre_n_per_m * (axle.half_track_m * at[0] + at[1 + i])
     }
 
-    /// Lateral acceleration at which the second inner wheel lifts, g; infinite when none does.
+    /// Load that moves between the two tyres of a leaning wheel of an axle, N.
+    fn between_twins_n(&self, i: usize, at: &Vector3<f64>) -> f64 {
+        let axle = &self.axles[i];
+        let lean = at[0] + axle.lean_per_m * at[1 + i];
+        axle.tyre_n_per_m * axle.half_twin_spacing_m * lean
+    }
+
+    /// Lateral acceleration at which the second inner wheel lifts, g; infinite when none does. Tyres
+    /// and springs are linear, but each tyre that lifts is taken out.
     fn lift_off_g(&self) -> f64 {
         let mut at = Vector3::zeros();
-        let mut lifted = [false; 2];
+        let mut stands = [Stand::AT_REST; 2];
         let mut transferred = [0.0; 2];
         let mut load = Vector3::zeros();
         let mut acceleration_g = 0.0;
         while acceleration_g < LARGEST_G {
             acceleration_g += STEP_G;
             let next = self.load(acceleration_g * GRAVITY_M_S2, transferred);
-            at += self.solve(&(next - load), lifted);
+            at += self.solve(&(next - load), stands);
             load = next;
-            for i in 0..2 {
-                if !lifted[i] {
-                    transferred[i] = self.transfer_n(i, &at) / self.axles[i].load_n;
-                    lifted[i] = transferred[i] >= 1.0;
+            for (i, stand) in stands.iter_mut().enumerate() {
+                let at_rest = self.axles[i].load_n;
+                if !stand.lifted {
+                    transferred[i] = (self.transfer_n(i, &at) / at_rest).min(1.0);
+                    stand.lifted = transferred[i] >= 1.0;
                 }
+                let between = self.between_twins_n(i, &at).abs();
+                let whole = [1.0 + transferred[i], 1.0 - transferred[i]]
+                    .iter()
+                    .filter(|share| between < *share * at_rest)
+                    .count();
+                stand.twins = whole as f64;
             }
-            if lifted[0] && lifted[1] {
+            if stands.iter().all(|stand| stand.lifted) {
                 return acceleration_g;
             }
         }

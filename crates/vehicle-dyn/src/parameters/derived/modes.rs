@@ -15,7 +15,7 @@ use nalgebra::{
 };
 use serde::Serialize;
 
-use super::axle::{Axle, add_square, axles, roll_stiffness};
+use super::axle::{Axle, Stand, add_square, axles, roll_stiffness};
 use crate::parameters::VehicleParameters;
 use crate::units::GRAVITY_M_S2;
 
@@ -145,7 +145,7 @@ fn roll(vehicle: &VehicleParameters, axles: &[Axle; 2]) -> Mode {
             coupling * inverse * coupling.transpose()
         });
     let free = inertia.fixed_view::<3, 3>(0, 0) - given;
-    let stiffness = roll_stiffness(axles, [false; 2]);
+    let stiffness = roll_stiffness(axles, [Stand::AT_REST; 2]);
     let [(slowest, _), ..] = modes(&free, &stiffness, &damping);
     slowest
 }
