@@ -20,6 +20,7 @@ pub mod report;
 pub mod run_log;
 pub mod scenario;
 pub mod summary;
+pub mod vehicles_command;
 
 use anyhow::Result;
 use interrupt::Interrupt;
@@ -35,5 +36,6 @@ pub fn execute(command: &cli::Command, interrupt: &Interrupt) -> Result<()> {
         cli::Command::Run(args) => campaign::single(args, interrupt),
         cli::Command::Record(args) => campaign::record_only(args, interrupt),
         cli::Command::Identify(args) => identify::identify(args, interrupt),
+        cli::Command::Vehicles(args) => vehicles_command::vehicles(args),
     }
 }

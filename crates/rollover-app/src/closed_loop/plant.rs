@@ -51,7 +51,7 @@ impl DrivenVehicle {
         Ok(Self {
             location: course.locate(seen.x_m, seen.y_m, Some(0.0)),
             monitor: OutcomeMonitor::new(course.width_m()),
-            driver: Driver::new(&scenario.driver)?,
+            driver: Driver::new(&scenario.driver_of(vehicle)?)?,
             sample_time_s: scenario.sample_time_s,
             seen,
             simulation,

@@ -6,6 +6,7 @@ mod load;
 
 use serde::Deserialize;
 use vehicle_dyn::driver::DriverParameters;
+use vehicle_dyn::parameters::VehicleParameters;
 use vehicle_dyn::road::CourseDescription;
 
 pub use controllers::{
@@ -34,8 +35,10 @@ pub struct Scenario {
     pub speed_reference_kmh: f64,
     /// The ground.
     pub ground: Ground,
-    /// The driver, who steers in every run and is the reference of the controllers.
-    pub driver: DriverParameters,
+    /// The driver, who steers in every run and is the reference of the controllers. Without one here
+    /// it is the vehicle's own.
+    #[serde(default)]
+    pub driver: Option<DriverParameters>,
     /// The road to be driven.
     pub course: CourseDescription,
     /// Bounds on the inputs, for every controller.
@@ -105,6 +108,27 @@ impl Scenario {
                 controller: name.to_owned(),
                 known: self.controller_names().join(", "),
             })
+    }
+
+    /// Who drives `vehicle`: the scenario's driver, or else the vehicle's own.
+    ///
+    /// # Errors
+    /// When neither file has one.
+    pub fn driver_of(
+        &self,
+        vehicle: &VehicleParameters,
+    ) -> Result<DriverParameters, ScenarioError> {
+        self.driver
+            .or(vehicle.driver)
+            .ok_or_else(|| ScenarioError::NoDriver {
+                scenario: self.name.clone(),
+                vehicle: vehicle.name.clone(),
+            })
+    }
+
+    /// Another vehicle than the scenario's takes its own driver along, if it has one.
+    pub fn swap_vehicle(&mut self, vehicle: &VehicleParameters) {
+        self.driver = vehicle.driver.or(self.driver);
     }
 
     /// Number of control steps of a run.

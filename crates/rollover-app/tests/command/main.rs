@@ -6,6 +6,7 @@ mod identify_bad_input;
 mod interruption;
 mod linear_mpc;
 mod reproducible;
+mod vehicles;
 
 use std::path::Path;
 use std::process::{Command, Output};
