@@ -198,7 +198,7 @@ fn wide_springs_count_with_their_motion_for_the_integration_step() {
         ("suspension.spring_rate_front_n_per_m", 1e7),
         ("suspension.solid_axle_front.damper_spacing_m", 5.0),
     ];
-    let light = ("mass.unsprung_mass_front_each_kg", 80.0);
+    let light = ("mass.unsprung_mass_front_each_kg", 30.0);
     let message = message(&changed(&[wide[0], wide[1], wide[2], light]));
     assert!(message.contains("hop at a rate of"), "{message}");
     let narrow = changed(&[wide[1], light]);
