@@ -105,7 +105,7 @@ fn gap_m(vehicle: &VehicleParameters, simulation: &Simulation) -> f64 {
                 tyre.vertical_stiffness_rear_n_per_m,
             )
         };
-        let side = if wheel % 2 == 0 { 0.5 } else { -0.5 };
+        let side = if wheel.is_multiple_of(2) { 0.5 } else { -0.5 };
         let at_rest = tyre.unloaded_radius_m - load / stiffness;
         let z = at_rest - vehicle.mass.sprung_cg_height_m + state.travel_m[wheel];
         let hub = state.position_m + rotation * Vector3::new(x, side * track, z);

@@ -70,7 +70,8 @@ impl VehicleParameters {
         let figures = self.derived();
         let cornering = self.cornering_figures(road_friction);
         let mut list = self.masses(&figures);
-        list.extend(self.stand(&figures, &cornering));
+        list.extend(self.inertias(&figures));
+        list.extend(stand(&figures, &cornering));
         list.extend(frequencies(&self.natural_modes()));
         list.extend(self.drive(&figures, road_friction));
         list
@@ -79,9 +80,6 @@ impl VehicleParameters {
     fn masses(&self, figures: &DerivedFigures) -> Vec<Figure> {
         let mass = &self.mass;
         let weight = figures.total_mass_kg * GRAVITY_M_S2;
-        let front = figures.cg_to_front_axle_m;
-        let gyration = |inertia: f64| (inertia / mass.sprung_mass_kg).sqrt();
-        let track = 0.5 * (self.geometry.track_front_m + self.geometry.track_rear_m);
         let pressed_mm = |load: f64, stiffness: f64| load / stiffness * 1e3;
         let tyre = &self.tyre;
         vec![
@@ -148,6 +146,15 @@ impl VehicleParameters {
                 60.0,
                 "tyre.vertical_stiffness_rear_n_per_m",
             ),
+        ]
+    }
+
+    fn inertias(&self, figures: &DerivedFigures) -> Vec<Figure> {
+        let mass = &self.mass;
+        let front = figures.cg_to_front_axle_m;
+        let gyration = |inertia: f64| (inertia / mass.sprung_mass_kg).sqrt();
+        let track = 0.5 * (self.geometry.track_front_m + self.geometry.track_rear_m);
+        vec![
             figure(
                 "height of the centre of gravity",
                 figures.cg_height_m,
@@ -182,101 +189,6 @@ impl VehicleParameters {
                 "mass.sprung_yaw_inertia_kg_m2 (the whole vehicle's?)",
             ),
         ]
-    }
-
-    fn stand(&self, figures: &DerivedFigures, cornering: &CorneringFigures) -> Vec<Figure> {
-        let (front, rear) = (
-            figures.roll_stiffness_front_nm_per_rad,
-            figures.roll_stiffness_rear_nm_per_rad,
-        );
-        let mut list = vec![
-            figure(
-                "static stability factor",
-                figures.static_stability_factor,
-                "",
-                0.7,
-                1.8,
-                "geometry.track_*, mass.sprung_cg_height_m",
-            ),
-            figure(
-                "lift-off at a lateral acceleration of",
-                cornering.lift_off_g,
-                "g",
-                0.4,
-                1.6,
-                "geometry.track_*, mass.sprung_cg_height_m",
-            ),
-            figure(
-                "grip when all load is on the outer wheels",
-                cornering.grip_on_two_wheels_g,
-                "g",
-                0.35,
-                1.2,
-                "tyre.mu_tyre, tyre.q_load",
-            ),
-            figure(
-                "load transfer ratio",
-                cornering.ltr_per_g,
-                "1/g",
-                0.55,
-                1.7,
-                "geometry.track_*, mass.sprung_cg_height_m",
-            ),
-            figure(
-                "roll gradient",
-                cornering.roll_gradient_deg_per_g,
-                "deg/g",
-                1.0,
-                12.0,
-                "suspension.spring_rate_*, suspension.anti_roll_*",
-            ),
-            figure(
-                "front share of the suspension's roll stiffness",
-                front / (front + rear),
-                "",
-                0.15,
-                0.85,
-                "suspension.anti_roll_*",
-            ),
-            figure(
-                "front share of the load transfer",
-                cornering.load_transfer_share_front,
-                "",
-                0.3,
-                0.8,
-                "suspension.anti_roll_*, geometry.roll_centre_height_*",
-            ),
-            figure(
-                "understeer gradient",
-                cornering.understeer_gradient_deg_per_g,
-                "deg/g",
-                -0.5,
-                6.0,
-                "tyre.stiffness_factor_b1_*",
-            ),
-        ];
-        let speeds = [
-            (
-                "characteristic speed",
-                cornering.characteristic_speed_m_s,
-                60.0,
-            ),
-            ("critical speed", cornering.critical_speed_m_s, 150.0),
-        ];
-        for (name, speed, least) in speeds {
-            if let Some(speed) = speed {
-                let value = speed / KMH;
-                list.push(figure(
-                    name,
-                    value,
-                    "km/h",
-                    least,
-                    f64::INFINITY,
-                    "tyre.stiffness_factor_b1_*",
-                ));
-            }
-        }
-        list
     }
 
     fn drive(&self, figures: &DerivedFigures, road_friction: f64) -> Vec<Figure> {
@@ -362,6 +274,101 @@ impl VehicleParameters {
         }
         low
     }
+}
+
+fn stand(figures: &DerivedFigures, cornering: &CorneringFigures) -> Vec<Figure> {
+    let (front, rear) = (
+        figures.roll_stiffness_front_nm_per_rad,
+        figures.roll_stiffness_rear_nm_per_rad,
+    );
+    let mut list = vec![
+        figure(
+            "static stability factor",
+            figures.static_stability_factor,
+            "",
+            0.7,
+            1.8,
+            "geometry.track_*, mass.sprung_cg_height_m",
+        ),
+        figure(
+            "lift-off at a lateral acceleration of",
+            cornering.lift_off_g,
+            "g",
+            0.4,
+            1.6,
+            "geometry.track_*, mass.sprung_cg_height_m",
+        ),
+        figure(
+            "grip when all load is on the outer wheels",
+            cornering.grip_on_two_wheels_g,
+            "g",
+            0.35,
+            1.2,
+            "tyre.mu_tyre, tyre.q_load",
+        ),
+        figure(
+            "load transfer ratio",
+            cornering.ltr_per_g,
+            "1/g",
+            0.55,
+            1.7,
+            "geometry.track_*, mass.sprung_cg_height_m",
+        ),
+        figure(
+            "roll gradient",
+            cornering.roll_gradient_deg_per_g,
+            "deg/g",
+            1.0,
+            12.0,
+            "suspension.spring_rate_*, suspension.anti_roll_*",
+        ),
+        figure(
+            "front share of the suspension's roll stiffness",
+            front / (front + rear),
+            "",
+            0.15,
+            0.85,
+            "suspension.anti_roll_*",
+        ),
+        figure(
+            "front share of the load transfer",
+            cornering.load_transfer_share_front,
+            "",
+            0.3,
+            0.8,
+            "suspension.anti_roll_*, geometry.roll_centre_height_*",
+        ),
+        figure(
+            "understeer gradient",
+            cornering.understeer_gradient_deg_per_g,
+            "deg/g",
+            -0.5,
+            6.0,
+            "tyre.stiffness_factor_b1_*",
+        ),
+    ];
+    let speeds = [
+        (
+            "characteristic speed",
+            cornering.characteristic_speed_m_s,
+            60.0,
+        ),
+        ("critical speed", cornering.critical_speed_m_s, 150.0),
+    ];
+    for (name, speed, least) in speeds {
+        if let Some(speed) = speed {
+            let value = speed / KMH;
+            list.push(figure(
+                name,
+                value,
+                "km/h",
+                least,
+                f64::INFINITY,
+                "tyre.stiffness_factor_b1_*",
+            ));
+        }
+    }
+    list
 }
 
 fn frequencies(modes: &NaturalModes) -> Vec<Figure> {
