@@ -15,7 +15,7 @@ fn the_list_has_every_vehicle_with_its_figures() {
     assert_says(&list, &NAMES);
     assert_says(
         &list,
-        &["mass, kg", "wheelbase", "SSF", "lift-off", "1263", "0.949"],
+        &["mass, kg", "wheelbase", "SSF", "lift-off", "1263", "0.950"],
     );
     let rows = json(&succeed(folder.path(), &["vehicles", "--json"]));
     let names: Vec<&str> = rows
