@@ -136,6 +136,7 @@ impl ReferenceParameters {
                 drag_area_m2: 0.0,
                 air_density_kg_per_m3: 1.2,
             },
+            driver: None,
         }
     }
 

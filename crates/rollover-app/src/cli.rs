@@ -29,6 +29,8 @@ pub enum Command {
     /// A standard manoeuvre with a vehicle: figures of merit, logs, pictures.
     #[command(after_help = crate::manoeuvre::help())]
     Manoeuvre(ManoeuvreArgs),
+    /// Lists the built-in vehicles; checks and shows vehicle files.
+    Vehicles(VehiclesArgs),
 }
 
 /// Arguments of `paper`.
@@ -180,6 +182,45 @@ pub struct ManoeuvreArgs {
     /// Print the report as JSON on standard output.
     #[arg(long)]
     pub json: bool,
+}
+
+/// Arguments of `vehicles`.
+#[derive(Debug, Args)]
+pub struct VehiclesArgs {
+    /// What to do instead of listing.
+    #[command(subcommand)]
+    pub action: Option<VehiclesAction>,
+    /// Print the list or the figures as JSON on standard output.
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Friction of the road for the figures that depend on it.
+    #[arg(long, global = true, value_name = "MU", default_value_t = 0.85, value_parser = friction)]
+    pub friction: f64,
+}
+
+/// What to do with vehicles.
+#[derive(Debug, Subcommand)]
+pub enum VehiclesAction {
+    /// Checks a vehicle file and prints the figures that follow from it, so that a wrong unit shows.
+    Check {
+        /// Path of a vehicle file, or name of a built-in vehicle.
+        vehicle: String,
+    },
+    /// Prints the file of a built-in vehicle, to start one of your own from.
+    Show {
+        /// Name of a built-in vehicle.
+        name: String,
+    },
+    /// Prints the JSON schema of vehicle files, for editors.
+    Schema,
+}
+
+fn friction(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(friction) if (0.01..=1.5).contains(&friction) => Ok(friction),
+        Ok(friction) => Err(format!("{friction} is not in [0.01, 1.5]")),
+        Err(_) => Err("not a number".into()),
+    }
 }
 
 fn speed_kmh(text: &str) -> Result<f64, String> {

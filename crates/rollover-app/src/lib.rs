@@ -23,6 +23,7 @@ pub mod run_log;
 pub mod scenario;
 pub mod summary;
 pub mod terrain;
+pub mod vehicles_command;
 
 use anyhow::Result;
 use interrupt::Interrupt;
@@ -40,5 +41,6 @@ pub fn execute(command: &cli::Command, interrupt: &Interrupt) -> Result<()> {
         cli::Command::Record(args) => campaign::record_only(args, interrupt),
         cli::Command::Identify(args) => identify::identify(args, interrupt),
         cli::Command::Manoeuvre(args) => manoeuvre::manoeuvre(args, interrupt),
+        cli::Command::Vehicles(args) => vehicles_command::vehicles(args),
     }
 }

@@ -57,7 +57,15 @@ pub fn print_json<T: Serialize>(value: &T) -> Result<()> {
 /// # Errors
 /// When standard output cannot be written for another reason.
 pub fn print_line(text: &str) -> Result<()> {
-    match writeln!(std::io::stdout().lock(), "{text}") {
+    print_text(&format!("{text}\n"))
+}
+
+/// Prints text with its own line ends on standard output.
+///
+/// # Errors
+/// As [`print_line`].
+pub fn print_text(text: &str) -> Result<()> {
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
             Err(error).context("cannot write to standard output")
         }

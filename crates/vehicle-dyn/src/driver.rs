@@ -4,6 +4,7 @@
 //! handwheel in proportion to how far the course lies beside that point, and to how fast the
 //! vehicle drifts away from the course. It stands for the paper's Simple Driver Model.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::road::{Course, Location};
@@ -11,7 +12,7 @@ use crate::simulation::Observation;
 use crate::units::wrap_angle;
 
 /// Parameters of the driver. All are the driver's, none the vehicle's.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DriverParameters {
     /// How far ahead the driver looks, s.
@@ -43,56 +44,32 @@ pub struct DriverError {
 }
 
 impl DriverParameters {
+    /// Field, least and largest value, and the same as text with the unit.
+    pub(crate) const RANGES: [(&'static str, f64, f64, &'static str); 7] = [
+        ("preview_time_s", 0.05, 10.0, "[0.05, 10] s"),
+        ("preview_gain_deg_per_m", 0.0, 1e3, "[0, 1e3] deg/m"),
+        ("error_rate_gain_deg_s_per_m", 0.0, 1e3, "[0, 1e3] deg s/m"),
+        ("integral_gain_deg_per_m_s", 0.0, 1e3, "[0, 1e3] deg/(m s)"),
+        ("lag_s", 0.0, 2.0, "[0, 2] s"),
+        ("handwheel_limit_deg", 1.0, 2e3, "[1, 2e3] deg"),
+        ("handwheel_rate_limit_deg_per_s", 1.0, 1e4, "[1, 1e4] deg/s"),
+    ];
+
     /// Checks every value against its range.
     ///
     /// # Errors
     /// [`DriverError`] with field, number and range.
     pub fn check(&self) -> Result<(), DriverError> {
-        for (field, value, low, high, range) in [
-            (
-                "preview_time_s",
-                self.preview_time_s,
-                0.05,
-                10.0,
-                "[0.05, 10] s",
-            ),
-            (
-                "preview_gain_deg_per_m",
-                self.preview_gain_deg_per_m,
-                0.0,
-                1e3,
-                "[0, 1e3] deg/m",
-            ),
-            (
-                "error_rate_gain_deg_s_per_m",
-                self.error_rate_gain_deg_s_per_m,
-                0.0,
-                1e3,
-                "[0, 1e3] deg s/m",
-            ),
-            (
-                "integral_gain_deg_per_m_s",
-                self.integral_gain_deg_per_m_s,
-                0.0,
-                1e3,
-                "[0, 1e3] deg/(m s)",
-            ),
-            ("lag_s", self.lag_s, 0.0, 2.0, "[0, 2] s"),
-            (
-                "handwheel_limit_deg",
-                self.handwheel_limit_deg,
-                1.0,
-                2e3,
-                "[1, 2e3] deg",
-            ),
-            (
-                "handwheel_rate_limit_deg_per_s",
-                self.handwheel_rate_limit_deg_per_s,
-                1.0,
-                1e4,
-                "[1, 1e4] deg/s",
-            ),
-        ] {
+        let values = [
+            self.preview_time_s,
+            self.preview_gain_deg_per_m,
+            self.error_rate_gain_deg_s_per_m,
+            self.integral_gain_deg_per_m_s,
+            self.lag_s,
+            self.handwheel_limit_deg,
+            self.handwheel_rate_limit_deg_per_s,
+        ];
+        for ((field, low, high, range), value) in Self::RANGES.into_iter().zip(values) {
             if !(value >= low && value <= high) {
                 return Err(DriverError {
                     field,

@@ -3,7 +3,19 @@
 use crate::parameters::{ParameterError, VehicleParameters};
 
 /// Name and text of every embedded vehicle file.
-const EMBEDDED: &[(&str, &str)] = &[("sedan", include_str!("../../../vehicles/sedan.toml"))];
+const EMBEDDED: &[(&str, &str)] = &[
+    ("sedan", include_str!("../../../vehicles/sedan.toml")),
+    (
+        "sedan-unladen",
+        include_str!("../../../vehicles/sedan-unladen.toml"),
+    ),
+    (
+        "utility-truck",
+        include_str!("../../../vehicles/utility-truck.toml"),
+    ),
+    ("suv", include_str!("../../../vehicles/suv.toml")),
+    ("hmmwv", include_str!("../../../vehicles/hmmwv.toml")),
+];
 
 /// Names of the embedded vehicles.
 #[must_use]

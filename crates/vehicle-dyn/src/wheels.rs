@@ -222,7 +222,8 @@ impl Wheel {
             moment_nm: patch.cross(&force),
             slip_rate,
             spin_moment_nm: -longitudinal * rolling_radius - rolling,
-            lean_moment_nm: load * rise_per_lean,
+            // The load acts where the patch is, not where a rigid tyre would have it.
+            lean_moment_nm: load * patch.cross(&normal).dot(&motion.turn_per_lean),
         }
     }
 

@@ -91,9 +91,8 @@ pub fn paper(args: &PaperArgs, interrupt: &Interrupt) -> Result<()> {
 /// # Errors
 /// When the run cannot be made or a result cannot be written.
 pub fn single(args: &RunArgs, interrupt: &Interrupt) -> Result<()> {
-    let scenario = scenario::load(&args.scenario)?;
+    let (scenario, vehicle) = scenario_with_vehicle(&args.scenario, args.vehicle.as_deref())?;
     let settings = scenario.controller(&args.controller)?;
-    let vehicle = load_vehicle(args.vehicle.as_ref().unwrap_or(&scenario.vehicle))?;
     let speed_reference_kmh = args.speed.unwrap_or(scenario.speed_reference_kmh);
     scenario.check_road_at(speed_reference_kmh)?;
     let [lowest, highest] = scenario.bounds.target_speed_kmh;
@@ -149,8 +148,7 @@ pub fn single(args: &RunArgs, interrupt: &Interrupt) -> Result<()> {
 /// # Errors
 /// When the recording cannot be made or written.
 pub fn record_only(args: &RecordArgs, interrupt: &Interrupt) -> Result<()> {
-    let scenario = scenario::load(&args.scenario)?;
-    let vehicle = load_vehicle(args.vehicle.as_ref().unwrap_or(&scenario.vehicle))?;
+    let (scenario, vehicle) = scenario_with_vehicle(&args.scenario, args.vehicle.as_deref())?;
     let out = args
         .out
         .clone()
@@ -213,6 +211,19 @@ fn recording(
     record::write(&out.join("recording.csv"), &dataset)?;
     write_json(&out.join("recording.json"), &summary)?;
     Ok(dataset)
+}
+
+/// A scenario with its vehicle, or with the one that the user names instead.
+fn scenario_with_vehicle(
+    scenario: &str,
+    instead: Option<&str>,
+) -> Result<(Scenario, VehicleParameters)> {
+    let mut scenario = scenario::load(scenario)?;
+    let vehicle = load_vehicle(instead.unwrap_or(&scenario.vehicle))?;
+    if instead.is_some() {
+        scenario.swap_vehicle(&vehicle);
+    }
+    Ok((scenario, vehicle))
 }
 
 fn load_vehicle(name_or_path: &str) -> Result<VehicleParameters> {

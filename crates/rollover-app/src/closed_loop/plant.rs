@@ -71,7 +71,7 @@ impl DrivenVehicle {
         let mut driven = Self {
             location: course.locate(seen.x_m, seen.y_m, Some(0.0)),
             monitor: OutcomeMonitor::new(course.width_m()),
-            driver: Driver::new(&scenario.driver)?,
+            driver: Driver::new(&scenario.driver_of(vehicle)?)?,
             sample_time_s: scenario.sample_time_s,
             load_transfer: LoadTransferIndex::new(vehicle),
             measured: sensors.measure(&seen),

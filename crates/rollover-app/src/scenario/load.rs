@@ -83,6 +83,16 @@ pub enum ScenarioError {
         /// What is wrong and what to do.
         message: String,
     },
+    /// Nobody is there to drive.
+    #[error(
+        "neither scenario {scenario} nor vehicle `{vehicle}` has a [driver]: add the table to one of them"
+    )]
+    NoDriver {
+        /// The scenario.
+        scenario: String,
+        /// The vehicle.
+        vehicle: String,
+    },
     /// The scenario has no such controller.
     #[error("scenario {scenario} has no controller `{controller}`: choose one of {known}")]
     UnknownController {
@@ -235,11 +245,13 @@ impl Check<'_> {
         )?;
         self.sensors(s)?;
         self.grounds_on_courses(s)?;
-        s.driver.check().map_err(|e| ScenarioError::Course {
-            origin: self.origin.to_owned(),
-            field: "driver",
-            message: e.to_string(),
-        })?;
+        if let Some(driver) = &s.driver {
+            driver.check().map_err(|e| ScenarioError::Course {
+                origin: self.origin.to_owned(),
+                field: "driver",
+                message: e.to_string(),
+            })?;
+        }
         s.controllers
             .iter()
             .try_for_each(|(name, c)| self.controller(name, c))

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 use vehicle_dyn::driver::DriverParameters;
+use vehicle_dyn::parameters::VehicleParameters;
 use vehicle_dyn::road::CourseDescription;
 use vehicle_dyn::sensors::{Channel, SensorDescription};
 use vehicle_dyn::terrain::GroundDescription;
@@ -53,8 +54,10 @@ pub struct Scenario {
     /// driver [`DRIVER_CHANNELS`].
     #[serde(default)]
     pub sensors: BTreeMap<Channel, SensorDescription>,
-    /// The driver, who steers in every run and is the reference of the controllers.
-    pub driver: DriverParameters,
+    /// The driver, who steers in every run and is the reference of the controllers. Without one here
+    /// it is the vehicle's own.
+    #[serde(default)]
+    pub driver: Option<DriverParameters>,
     /// The road to be driven.
     pub course: CourseDescription,
     /// Bounds on the inputs, for every controller.
@@ -125,6 +128,27 @@ impl Scenario {
     #[must_use]
     pub fn recording_ground(&self) -> &GroundDescription {
         self.recording.ground.as_ref().unwrap_or(&self.ground)
+    }
+
+    /// Who drives `vehicle`: the scenario's driver, or else the vehicle's own.
+    ///
+    /// # Errors
+    /// When neither file has one.
+    pub fn driver_of(
+        &self,
+        vehicle: &VehicleParameters,
+    ) -> Result<DriverParameters, ScenarioError> {
+        self.driver
+            .or(vehicle.driver)
+            .ok_or_else(|| ScenarioError::NoDriver {
+                scenario: self.name.clone(),
+                vehicle: vehicle.name.clone(),
+            })
+    }
+
+    /// Another vehicle than the scenario's takes its own driver along, if it has one.
+    pub fn swap_vehicle(&mut self, vehicle: &VehicleParameters) {
+        self.driver = vehicle.driver.or(self.driver);
     }
 
     /// Number of control steps of a run.

@@ -8,6 +8,7 @@ mod linear_mpc;
 mod manoeuvre;
 mod reproducible;
 mod terrain;
+mod vehicles;
 
 use std::path::Path;
 use std::process::{Command, Output};

@@ -1,8 +1,12 @@
 //! Every value against its allowed range, so that a wrong unit or sign stops at the door.
 
 mod contradictions;
+mod interval;
 mod ranges;
 mod stiffness;
+
+pub use interval::Interval;
+pub use ranges::{Field, fields};
 
 use super::{ParameterError, VehicleParameters};
 

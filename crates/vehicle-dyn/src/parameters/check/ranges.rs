@@ -1,478 +1,248 @@
-//! One row per value: field, value, interval, unit.
+//! One row per value: table, key, interval, unit. Messages, schema and documentation read it.
 
+use super::interval::{Interval, above, within};
+use crate::driver::DriverParameters;
 use crate::parameters::{ParameterError, SolidAxleParameters, VehicleParameters};
 
-/// An allowed interval; its upper end belongs to it.
-#[derive(Clone, Copy)]
-struct Interval {
-    low: f64,
-    low_belongs: bool,
-    high: f64,
+/// A value of a vehicle file and what it may be.
+#[derive(Debug, Clone, Copy)]
+pub struct Field {
+    /// Table of the file, such as `suspension.solid_axle_rear`.
+    pub table: &'static str,
+    /// Key in the table.
+    pub key: &'static str,
+    /// Allowed values.
+    pub interval: Interval,
+    /// Unit, empty for none.
+    pub unit: &'static str,
+    value: fn(&VehicleParameters) -> Option<f64>,
 }
 
-/// `low < value ≤ high`.
-const fn above(low: f64, high: f64) -> Interval {
-    Interval {
-        low,
-        low_belongs: false,
-        high,
+impl Field {
+    /// The value, or `None` when the vehicle has no such table.
+    #[must_use]
+    pub fn value(&self, vehicle: &VehicleParameters) -> Option<f64> {
+        (self.value)(vehicle)
+    }
+
+    /// Allowed values with their unit, such as `(0, 1e5] kg`.
+    #[must_use]
+    pub fn range(&self) -> String {
+        let unit = self.unit;
+        let space = if unit.is_empty() { "" } else { " " };
+        format!("{}{space}{unit}", self.interval)
     }
 }
 
-/// `low ≤ value ≤ high`.
-const fn within(low: f64, high: f64) -> Interval {
-    Interval {
-        low,
-        low_belongs: true,
-        high,
-    }
+/// Rows of a table that every vehicle has, then of one that it may have.
+macro_rules! rows {
+    ($table:ident { $($key:ident in $interval:expr, $unit:literal;)* }) => {
+        [$(Field {
+            table: stringify!($table),
+            key: stringify!($key),
+            interval: $interval,
+            unit: $unit,
+            value: |vehicle| Some(vehicle.$table.$key),
+        }),*]
+    };
+    ($name:literal, $table:path { $($key:ident in $interval:expr, $unit:literal;)* }) => {
+        [$(Field {
+            table: $name,
+            key: stringify!($key),
+            interval: $interval,
+            unit: $unit,
+            value: |vehicle| $table(vehicle).map(|table| table.$key),
+        }),*]
+    };
 }
 
-impl Interval {
-    /// NaN is in no interval.
-    fn contains(self, value: f64) -> bool {
-        value <= self.high && (value > self.low || (self.low_belongs && value >= self.low))
-    }
+fn solid_axle_front(vehicle: &VehicleParameters) -> Option<&SolidAxleParameters> {
+    vehicle.suspension.solid_axle_front.as_ref()
 }
 
-impl std::fmt::Display for Interval {
-    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let bracket = if self.low_belongs { '[' } else { '(' };
-        write!(
-            formatter,
-            "{bracket}{}, {}]",
-            short(self.low),
-            short(self.high)
-        )
-    }
+fn solid_axle_rear(vehicle: &VehicleParameters) -> Option<&SolidAxleParameters> {
+    vehicle.suspension.solid_axle_rear.as_ref()
 }
 
-/// `1e5` instead of `100000`, but `0.5` as it is.
-fn short(value: f64) -> String {
-    if value.abs() >= 1e4 {
-        format!("{value:e}")
-    } else {
-        format!("{value}")
-    }
+fn driver(vehicle: &VehicleParameters) -> Option<&DriverParameters> {
+    vehicle.driver.as_ref()
 }
 
-type Row<'a> = (&'a str, f64, Interval, &'a str);
+const INERTIA: Interval = above(0.0, 1e6);
+const MASS: [Field; 8] = rows!(mass {
+    sprung_mass_kg in above(0.0, 1e5), "kg";
+    unsprung_mass_front_each_kg in above(0.0, 1e4), "kg";
+    unsprung_mass_rear_each_kg in above(0.0, 1e4), "kg";
+    sprung_roll_inertia_kg_m2 in INERTIA, "kg m²";
+    sprung_pitch_inertia_kg_m2 in INERTIA, "kg m²";
+    sprung_yaw_inertia_kg_m2 in INERTIA, "kg m²";
+    sprung_roll_yaw_product_kg_m2 in within(-1e6, 1e6), "kg m²";
+    sprung_cg_height_m in above(0.0, 5.0), "m";
+});
+
+const ROLL_CENTRE: Interval = within(-0.5, 2.0);
+const GEOMETRY: [Field; 6] = rows!(geometry {
+    sprung_cg_to_front_axle_m in above(0.0, 20.0), "m";
+    sprung_cg_to_rear_axle_m in above(0.0, 20.0), "m";
+    track_front_m in above(0.0, 5.0), "m";
+    track_rear_m in above(0.0, 5.0), "m";
+    roll_centre_height_front_m in ROLL_CENTRE, "m";
+    roll_centre_height_rear_m in ROLL_CENTRE, "m";
+});
+
+// Below 1000 N/m a spring rate is most likely in N/mm.
+const SPRING: Interval = within(1e3, 1e7);
+const DAMPING: Interval = within(0.0, 2e5);
+const SUSPENSION: [Field; 13] = rows!(suspension {
+    spring_rate_front_n_per_m in SPRING, "N/m";
+    spring_rate_rear_n_per_m in SPRING, "N/m";
+    damping_bump_front_n_s_per_m in DAMPING, "N s/m";
+    damping_rebound_front_n_s_per_m in DAMPING, "N s/m";
+    damping_bump_rear_n_s_per_m in DAMPING, "N s/m";
+    damping_rebound_rear_n_s_per_m in DAMPING, "N s/m";
+    anti_roll_front_nm_per_rad in within(-1e7, 1e7), "N m/rad";
+    anti_roll_rear_nm_per_rad in within(-1e7, 1e7), "N m/rad";
+    travel_m in above(0.0, 1.0), "m";
+    bump_stop_n_per_m in within(0.0, 1e8), "N/m";
+    bump_stop_n_per_m2 in within(0.0, 1e10), "N/m²";
+    camber_gain_front_rad_per_m in within(-5.0, 5.0), "rad/m";
+    camber_gain_rear_rad_per_m in within(-5.0, 5.0), "rad/m";
+});
+
+// Closer than 0.1 m nothing stands beside a differential.
+const SPACING: Interval = within(0.1, 5.0);
+const SOLID_AXLE_FRONT: [Field; 2] = rows!("suspension.solid_axle_front", solid_axle_front {
+    spring_spacing_m in SPACING, "m";
+    damper_spacing_m in SPACING, "m";
+});
+const SOLID_AXLE_REAR: [Field; 2] = rows!("suspension.solid_axle_rear", solid_axle_rear {
+    spring_spacing_m in SPACING, "m";
+    damper_spacing_m in SPACING, "m";
+});
+
+const RADIAL: Interval = within(1e4, 1e8);
+// Shorter lengths make the slip faster than the 1 ms step can follow at speed.
+const RELAXATION: Interval = within(0.05, 5.0);
+const TYRE: [Field; 18] = rows!(tyre {
+    unloaded_radius_m in above(0.05, 2.0), "m";
+    vertical_stiffness_front_n_per_m in RADIAL, "N/m";
+    vertical_stiffness_rear_n_per_m in RADIAL, "N/m";
+    twin_spacing_rear_m in within(0.0, 1.0), "m";
+    crown_radius_m in within(0.0, 2.0), "m";
+    lateral_compliance_m_per_n in within(0.0, 1e-3), "m/N";
+    vertical_damping_n_s_per_m in within(0.0, 1e5), "N s/m";
+    mu_tyre in above(0.0, 3.0), "";
+    stiffness_factor_b1_front in above(0.0, 100.0), "";
+    stiffness_factor_b1_rear in above(0.0, 100.0), "";
+    // Beyond C1 = 2 the force would change sign with growing slip.
+    shape_factor_c1 in within(0.5, 2.0), "";
+    curvature_factor_e1 in within(-20.0, 1.0), "";
+    stiffness_saturation_c2 in within(0.0, 20.0), "";
+    q_load in within(0.0, 2.0), "";
+    camber_thrust_ratio in within(-1.0, 1.0), "";
+    relaxation_length_lateral_m in RELAXATION, "m";
+    relaxation_length_longitudinal_m in RELAXATION, "m";
+    rolling_resistance_coefficient in within(0.0, 0.5), "";
+});
+
+const WHEEL: [Field; 4] = rows!(wheel {
+    spin_inertia_front_kg_m2 in within(0.05, 1e3), "kg m²";
+    spin_inertia_rear_kg_m2 in within(0.05, 1e3), "kg m²";
+    gyroscopic_inertia_front_kg_m2 in within(0.0, 1e3), "kg m²";
+    gyroscopic_inertia_rear_kg_m2 in within(0.0, 1e3), "kg m²";
+});
+
+const STEERING: [Field; 5] = rows!(steering {
+    ratio in within(1.0, 60.0), "";
+    bandwidth_hz in within(0.2, 50.0), "Hz";
+    damping_ratio in within(0.1, 5.0), "";
+    handwheel_rate_limit_deg_per_s in above(0.0, 1e4), "deg/s";
+    handwheel_limit_deg in above(0.0, 2e3), "deg";
+});
+
+const SHARE: Interval = within(0.0, 1.0);
+const LAG: Interval = within(0.005, 10.0);
+const POWERTRAIN: [Field; 10] = rows!(powertrain {
+    // Below 1000 W a power is most likely in kW.
+    max_power_w in within(1e3, 1e7), "W";
+    max_drive_force_n in above(0.0, 1e7), "N";
+    drive_share_front in SHARE, "";
+    engine_lag_s in LAG, "s";
+    differential_coupling_nm_s_per_rad in within(0.0, 500.0), "N m s/rad";
+    max_brake_force_n in above(0.0, 1e7), "N";
+    brake_share_front in SHARE, "";
+    brake_lag_s in LAG, "s";
+    speed_gain_per_s in above(0.0, 20.0), "1/s";
+    speed_integral_gain_per_s2 in within(0.0, 20.0), "1/s²";
+});
+
+const AERODYNAMICS: [Field; 2] = rows!(aerodynamics {
+    drag_area_m2 in within(0.0, 50.0), "m²";
+    air_density_kg_per_m3 in within(0.0, 5.0), "kg/m³";
+});
+
+const fn driver_interval(row: usize) -> Interval {
+    let (_, low, high, _) = DriverParameters::RANGES[row];
+    within(low, high)
+}
+
+// The driver's own table holds these ranges; here they get a place in the file.
+const DRIVER: [Field; 7] = rows!("driver", driver {
+    preview_time_s in driver_interval(0), "s";
+    preview_gain_deg_per_m in driver_interval(1), "deg/m";
+    error_rate_gain_deg_s_per_m in driver_interval(2), "deg s/m";
+    integral_gain_deg_per_m_s in driver_interval(3), "deg/(m s)";
+    lag_s in driver_interval(4), "s";
+    handwheel_limit_deg in driver_interval(5), "deg";
+    handwheel_rate_limit_deg_per_s in driver_interval(6), "deg/s";
+});
+
+/// Every number of a vehicle file, table by table in the file's order.
+const TABLES: [&[Field]; 11] = [
+    &MASS,
+    &GEOMETRY,
+    &SUSPENSION,
+    &SOLID_AXLE_FRONT,
+    &SOLID_AXLE_REAR,
+    &TYRE,
+    &WHEEL,
+    &STEERING,
+    &POWERTRAIN,
+    &AERODYNAMICS,
+    &DRIVER,
+];
+
+/// Every number of a vehicle file with its allowed range, in the file's order.
+pub fn fields() -> impl Iterator<Item = &'static Field> {
+    TABLES.into_iter().flatten()
+}
 
 pub(super) fn check(vehicle: &VehicleParameters, origin: &str) -> Result<(), ParameterError> {
-    check_rows("mass", &mass_rows(vehicle), origin)?;
-    check_rows("geometry", &geometry_rows(vehicle), origin)?;
-    check_rows("suspension", &suspension_rows(vehicle), origin)?;
-    let suspension = &vehicle.suspension;
-    for (table, axle) in [
-        ("suspension.solid_axle_front", &suspension.solid_axle_front),
-        ("suspension.solid_axle_rear", &suspension.solid_axle_rear),
-    ] {
-        if let Some(axle) = axle {
-            check_rows(table, &solid_axle_rows(axle), origin)?;
+    for field in fields() {
+        let Some(value) = field.value(vehicle) else {
+            continue;
+        };
+        if !field.interval.contains(value) {
+            return Err(ParameterError::OutOfRange {
+                field: format!("{}.{}", field.table, field.key),
+                value,
+                range: field.range(),
+                origin: origin.to_owned(),
+            });
         }
     }
-    check_rows("tyre", &tyre_rows(vehicle), origin)?;
-    check_rows("wheel", &wheel_rows(vehicle), origin)?;
-    check_rows("steering", &steering_rows(vehicle), origin)?;
-    check_rows("powertrain", &powertrain_rows(vehicle), origin)?;
-    check_rows("aerodynamics", &aerodynamics_rows(vehicle), origin)
+    Ok(())
 }
 
-fn check_rows(table: &str, rows: &[Row<'_>], origin: &str) -> Result<(), ParameterError> {
-    match rows
-        .iter()
-        .find(|(_, value, interval, _)| !interval.contains(*value))
-    {
-        None => Ok(()),
-        Some((key, value, interval, unit)) => Err(ParameterError::OutOfRange {
-            field: format!("{table}.{key}"),
-            value: *value,
-            range: format!("{interval} {unit}").trim_end().to_owned(),
-            origin: origin.to_owned(),
-        }),
+#[cfg(test)]
+mod tests {
+    use super::DRIVER;
+    use crate::driver::DriverParameters;
+
+    #[test]
+    fn the_rows_of_the_driver_are_in_the_order_of_its_own_table() {
+        for (field, (name, ..)) in DRIVER.iter().zip(DriverParameters::RANGES) {
+            assert_eq!(field.key, name);
+        }
     }
-}
-
-fn mass_rows(vehicle: &VehicleParameters) -> [Row<'_>; 8] {
-    let v = &vehicle.mass;
-    let inertia = above(0.0, 1e6);
-    [
-        ("sprung_mass_kg", v.sprung_mass_kg, above(0.0, 1e5), "kg"),
-        (
-            "unsprung_mass_front_each_kg",
-            v.unsprung_mass_front_each_kg,
-            above(0.0, 1e4),
-            "kg",
-        ),
-        (
-            "unsprung_mass_rear_each_kg",
-            v.unsprung_mass_rear_each_kg,
-            above(0.0, 1e4),
-            "kg",
-        ),
-        (
-            "sprung_roll_inertia_kg_m2",
-            v.sprung_roll_inertia_kg_m2,
-            inertia,
-            "kg m²",
-        ),
-        (
-            "sprung_pitch_inertia_kg_m2",
-            v.sprung_pitch_inertia_kg_m2,
-            inertia,
-            "kg m²",
-        ),
-        (
-            "sprung_yaw_inertia_kg_m2",
-            v.sprung_yaw_inertia_kg_m2,
-            inertia,
-            "kg m²",
-        ),
-        (
-            "sprung_roll_yaw_product_kg_m2",
-            v.sprung_roll_yaw_product_kg_m2,
-            within(-1e6, 1e6),
-            "kg m²",
-        ),
-        (
-            "sprung_cg_height_m",
-            v.sprung_cg_height_m,
-            above(0.0, 5.0),
-            "m",
-        ),
-    ]
-}
-
-fn geometry_rows(vehicle: &VehicleParameters) -> [Row<'_>; 6] {
-    let v = &vehicle.geometry;
-    let roll_centre = within(-0.5, 2.0);
-    [
-        (
-            "sprung_cg_to_front_axle_m",
-            v.sprung_cg_to_front_axle_m,
-            above(0.0, 20.0),
-            "m",
-        ),
-        (
-            "sprung_cg_to_rear_axle_m",
-            v.sprung_cg_to_rear_axle_m,
-            above(0.0, 20.0),
-            "m",
-        ),
-        ("track_front_m", v.track_front_m, above(0.0, 5.0), "m"),
-        ("track_rear_m", v.track_rear_m, above(0.0, 5.0), "m"),
-        (
-            "roll_centre_height_front_m",
-            v.roll_centre_height_front_m,
-            roll_centre,
-            "m",
-        ),
-        (
-            "roll_centre_height_rear_m",
-            v.roll_centre_height_rear_m,
-            roll_centre,
-            "m",
-        ),
-    ]
-}
-
-fn suspension_rows(vehicle: &VehicleParameters) -> [Row<'_>; 13] {
-    let v = &vehicle.suspension;
-    // Below 1000 N/m a spring rate is most likely in N/mm.
-    let spring = within(1e3, 1e7);
-    let damping = within(0.0, 2e5);
-    let anti_roll = within(-1e7, 1e7);
-    let camber = within(-5.0, 5.0);
-    let (bump_front, rebound_front) = (
-        v.damping_bump_front_n_s_per_m,
-        v.damping_rebound_front_n_s_per_m,
-    );
-    let (bump_rear, rebound_rear) = (
-        v.damping_bump_rear_n_s_per_m,
-        v.damping_rebound_rear_n_s_per_m,
-    );
-    [
-        (
-            "spring_rate_front_n_per_m",
-            v.spring_rate_front_n_per_m,
-            spring,
-            "N/m",
-        ),
-        (
-            "spring_rate_rear_n_per_m",
-            v.spring_rate_rear_n_per_m,
-            spring,
-            "N/m",
-        ),
-        ("damping_bump_front_n_s_per_m", bump_front, damping, "N s/m"),
-        (
-            "damping_rebound_front_n_s_per_m",
-            rebound_front,
-            damping,
-            "N s/m",
-        ),
-        ("damping_bump_rear_n_s_per_m", bump_rear, damping, "N s/m"),
-        (
-            "damping_rebound_rear_n_s_per_m",
-            rebound_rear,
-            damping,
-            "N s/m",
-        ),
-        (
-            "anti_roll_front_nm_per_rad",
-            v.anti_roll_front_nm_per_rad,
-            anti_roll,
-            "N m/rad",
-        ),
-        (
-            "anti_roll_rear_nm_per_rad",
-            v.anti_roll_rear_nm_per_rad,
-            anti_roll,
-            "N m/rad",
-        ),
-        ("travel_m", v.travel_m, above(0.0, 1.0), "m"),
-        (
-            "bump_stop_n_per_m",
-            v.bump_stop_n_per_m,
-            within(0.0, 1e8),
-            "N/m",
-        ),
-        (
-            "bump_stop_n_per_m2",
-            v.bump_stop_n_per_m2,
-            within(0.0, 1e10),
-            "N/m²",
-        ),
-        (
-            "camber_gain_front_rad_per_m",
-            v.camber_gain_front_rad_per_m,
-            camber,
-            "rad/m",
-        ),
-        (
-            "camber_gain_rear_rad_per_m",
-            v.camber_gain_rear_rad_per_m,
-            camber,
-            "rad/m",
-        ),
-    ]
-}
-
-fn solid_axle_rows(v: &SolidAxleParameters) -> [Row<'_>; 2] {
-    let spacing = above(0.0, 5.0);
-    [
-        ("spring_spacing_m", v.spring_spacing_m, spacing, "m"),
-        ("damper_spacing_m", v.damper_spacing_m, spacing, "m"),
-    ]
-}
-
-fn tyre_rows(vehicle: &VehicleParameters) -> [Row<'_>; 18] {
-    let v = &vehicle.tyre;
-    let radial = within(1e4, 1e8);
-    let (radial_front, radial_rear) = (
-        v.vertical_stiffness_front_n_per_m,
-        v.vertical_stiffness_rear_n_per_m,
-    );
-    // Shorter lengths make the slip faster than the 1 ms step can follow at speed.
-    let relaxation = within(0.05, 5.0);
-    let (lateral, longitudinal) = (
-        v.relaxation_length_lateral_m,
-        v.relaxation_length_longitudinal_m,
-    );
-    let rolling = v.rolling_resistance_coefficient;
-    [
-        (
-            "unloaded_radius_m",
-            v.unloaded_radius_m,
-            above(0.05, 2.0),
-            "m",
-        ),
-        (
-            "vertical_stiffness_front_n_per_m",
-            radial_front,
-            radial,
-            "N/m",
-        ),
-        (
-            "vertical_stiffness_rear_n_per_m",
-            radial_rear,
-            radial,
-            "N/m",
-        ),
-        (
-            "twin_spacing_rear_m",
-            v.twin_spacing_rear_m,
-            within(0.0, 1.0),
-            "m",
-        ),
-        ("crown_radius_m", v.crown_radius_m, within(0.0, 2.0), "m"),
-        (
-            "lateral_compliance_m_per_n",
-            v.lateral_compliance_m_per_n,
-            within(0.0, 1e-3),
-            "m/N",
-        ),
-        (
-            "vertical_damping_n_s_per_m",
-            v.vertical_damping_n_s_per_m,
-            within(0.0, 1e5),
-            "N s/m",
-        ),
-        ("mu_tyre", v.mu_tyre, above(0.0, 3.0), ""),
-        (
-            "stiffness_factor_b1_front",
-            v.stiffness_factor_b1_front,
-            above(0.0, 100.0),
-            "",
-        ),
-        (
-            "stiffness_factor_b1_rear",
-            v.stiffness_factor_b1_rear,
-            above(0.0, 100.0),
-            "",
-        ),
-        // Beyond C1 = 2 the force would change sign with growing slip.
-        ("shape_factor_c1", v.shape_factor_c1, within(0.5, 2.0), ""),
-        (
-            "curvature_factor_e1",
-            v.curvature_factor_e1,
-            within(-20.0, 1.0),
-            "",
-        ),
-        (
-            "stiffness_saturation_c2",
-            v.stiffness_saturation_c2,
-            within(0.0, 20.0),
-            "",
-        ),
-        ("q_load", v.q_load, within(0.0, 2.0), ""),
-        (
-            "camber_thrust_ratio",
-            v.camber_thrust_ratio,
-            within(-1.0, 1.0),
-            "",
-        ),
-        ("relaxation_length_lateral_m", lateral, relaxation, "m"),
-        (
-            "relaxation_length_longitudinal_m",
-            longitudinal,
-            relaxation,
-            "m",
-        ),
-        (
-            "rolling_resistance_coefficient",
-            rolling,
-            within(0.0, 0.5),
-            "",
-        ),
-    ]
-}
-
-fn wheel_rows(vehicle: &VehicleParameters) -> [Row<'_>; 4] {
-    let v = &vehicle.wheel;
-    let (front, rear) = (v.spin_inertia_front_kg_m2, v.spin_inertia_rear_kg_m2);
-    // The bare wheel is a part of what resists spinning up.
-    let unit = "kg m² (at most the spin inertia)";
-    [
-        (
-            "spin_inertia_front_kg_m2",
-            front,
-            within(0.05, 1e3),
-            "kg m²",
-        ),
-        ("spin_inertia_rear_kg_m2", rear, within(0.05, 1e3), "kg m²"),
-        (
-            "gyroscopic_inertia_front_kg_m2",
-            v.gyroscopic_inertia_front_kg_m2,
-            within(0.0, front),
-            unit,
-        ),
-        (
-            "gyroscopic_inertia_rear_kg_m2",
-            v.gyroscopic_inertia_rear_kg_m2,
-            within(0.0, rear),
-            unit,
-        ),
-    ]
-}
-
-fn steering_rows(vehicle: &VehicleParameters) -> [Row<'_>; 5] {
-    let v = &vehicle.steering;
-    let rate = v.handwheel_rate_limit_deg_per_s;
-    [
-        ("ratio", v.ratio, within(1.0, 60.0), ""),
-        ("bandwidth_hz", v.bandwidth_hz, within(0.2, 50.0), "Hz"),
-        ("damping_ratio", v.damping_ratio, within(0.1, 5.0), ""),
-        (
-            "handwheel_rate_limit_deg_per_s",
-            rate,
-            above(0.0, 1e4),
-            "deg/s",
-        ),
-        (
-            "handwheel_limit_deg",
-            v.handwheel_limit_deg,
-            above(0.0, 2e3),
-            "deg",
-        ),
-    ]
-}
-
-fn powertrain_rows(vehicle: &VehicleParameters) -> [Row<'_>; 10] {
-    let v = &vehicle.powertrain;
-    let share = within(0.0, 1.0);
-    let lag = within(0.005, 10.0);
-    let coupling = v.differential_coupling_nm_s_per_rad;
-    let integral = v.speed_integral_gain_per_s2;
-    [
-        // Below 1000 W a power is most likely in kW.
-        ("max_power_w", v.max_power_w, within(1e3, 1e7), "W"),
-        (
-            "max_drive_force_n",
-            v.max_drive_force_n,
-            above(0.0, 1e7),
-            "N",
-        ),
-        ("drive_share_front", v.drive_share_front, share, ""),
-        ("engine_lag_s", v.engine_lag_s, lag, "s"),
-        (
-            "differential_coupling_nm_s_per_rad",
-            coupling,
-            within(0.0, 500.0),
-            "N m s/rad",
-        ),
-        (
-            "max_brake_force_n",
-            v.max_brake_force_n,
-            above(0.0, 1e7),
-            "N",
-        ),
-        ("brake_share_front", v.brake_share_front, share, ""),
-        ("brake_lag_s", v.brake_lag_s, lag, "s"),
-        (
-            "speed_gain_per_s",
-            v.speed_gain_per_s,
-            above(0.0, 20.0),
-            "1/s",
-        ),
-        (
-            "speed_integral_gain_per_s2",
-            integral,
-            within(0.0, 20.0),
-            "1/s²",
-        ),
-    ]
-}
-
-fn aerodynamics_rows(vehicle: &VehicleParameters) -> [Row<'_>; 2] {
-    let v = &vehicle.aerodynamics;
-    [
-        ("drag_area_m2", v.drag_area_m2, within(0.0, 50.0), "m²"),
-        (
-            "air_density_kg_per_m3",
-            v.air_density_kg_per_m3,
-            within(0.0, 5.0),
-            "kg/m³",
-        ),
-    ]
 }

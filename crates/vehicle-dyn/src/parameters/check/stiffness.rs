@@ -1,6 +1,6 @@
 //! Wheels that would hop faster than the integration step can follow.
 
-use crate::parameters::{ParameterError, VehicleParameters};
+use crate::parameters::{ParameterError, SolidAxleParameters, VehicleParameters};
 use crate::simulation::DEFAULT_SUBSTEP_S;
 
 /// Fastest rate of a wheel hop per step. RK4 is stable up to 2.8 for undamped motion and 2.78 for
@@ -16,6 +16,9 @@ struct Corner {
     spring_n_per_m: f64,
     anti_roll_nm_per_rad: f64,
     damping_n_s_per_m: f64,
+    /// Largest ratio of the motion at a spring or damper to that of the wheel: above 1 only on a
+    /// solid axle whose springs stand wider than its wheels.
+    motion_ratio: f64,
     track_m: f64,
     to_axle_m: f64,
 }
@@ -33,12 +36,14 @@ impl Corner {
         let inverse_unsprung = 1.0 / self.unsprung_kg;
         // An anti-roll bar is met twice over when left and right move against each other.
         let anti_roll = 2.0 * self.anti_roll_nm_per_rad.max(0.0) / (self.track_m * self.track_m);
-        let suspension = self.spring_n_per_m + vehicle.suspension.bump_stop_n_per_m + anti_roll;
+        let lever = self.motion_ratio * self.motion_ratio;
+        let springs = self.spring_n_per_m + vehicle.suspension.bump_stop_n_per_m;
+        let suspension = lever * springs + anti_roll;
         let stiffness =
             self.tyre_n_per_m * inverse_unsprung + suspension * (inverse_unsprung + mobility);
         let half_damping = 0.5
             * (vehicle.tyre.vertical_damping_n_s_per_m * inverse_unsprung
-                + self.damping_n_s_per_m * (inverse_unsprung + mobility));
+                + lever * self.damping_n_s_per_m * (inverse_unsprung + mobility));
         let beyond = half_damping * half_damping - stiffness;
         if beyond > 0.0 {
             half_damping + beyond.sqrt()
@@ -84,6 +89,11 @@ pub(super) fn check(vehicle: &VehicleParameters, origin: &str) -> Result<(), Par
 fn corners(vehicle: &VehicleParameters) -> [Corner; 2] {
     let (mass, geometry) = (&vehicle.mass, &vehicle.geometry);
     let (suspension, tyre) = (&vehicle.suspension, &vehicle.tyre);
+    let motion_ratio = |solid: &Option<SolidAxleParameters>, track_m: f64| {
+        solid.as_ref().map_or(1.0, |axle| {
+            (axle.spring_spacing_m.max(axle.damper_spacing_m) / track_m).max(1.0)
+        })
+    };
     [
         Corner {
             axle: "front",
@@ -94,6 +104,7 @@ fn corners(vehicle: &VehicleParameters) -> [Corner; 2] {
             damping_n_s_per_m: suspension
                 .damping_bump_front_n_s_per_m
                 .max(suspension.damping_rebound_front_n_s_per_m),
+            motion_ratio: motion_ratio(&suspension.solid_axle_front, geometry.track_front_m),
             track_m: geometry.track_front_m,
             to_axle_m: geometry.sprung_cg_to_front_axle_m,
         },
@@ -106,6 +117,7 @@ fn corners(vehicle: &VehicleParameters) -> [Corner; 2] {
             damping_n_s_per_m: suspension
                 .damping_bump_rear_n_s_per_m
                 .max(suspension.damping_rebound_rear_n_s_per_m),
+            motion_ratio: motion_ratio(&suspension.solid_axle_rear, geometry.track_rear_m),
             track_m: geometry.track_rear_m,
             to_axle_m: geometry.sprung_cg_to_rear_axle_m,
         },

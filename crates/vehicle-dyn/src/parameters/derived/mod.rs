@@ -1,5 +1,14 @@
 //! Figures a vehicle engineer checks first: a wrong unit shows here.
 
+mod axle;
+mod cornering;
+mod figures;
+mod modes;
+
+pub use cornering::CorneringFigures;
+pub use figures::Figure;
+pub use modes::{Mode, NaturalModes};
+
 use serde::Serialize;
 
 use super::{SolidAxleParameters, VehicleParameters};
