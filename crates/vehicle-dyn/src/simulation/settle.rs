@@ -4,7 +4,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::dynamics::{Dynamics, HeldInput};
 use super::state::State;
-use super::{InitialPose, LARGEST_SPEED_M_S, LongitudinalDemand, SimulationError, rk4};
+use super::{InitialPose, LARGEST_SPEED_M_S, LongitudinalDemand, SimulationError, advanced};
 use crate::powertrain::PowertrainState;
 use crate::terrain::Terrain;
 use crate::units::GRAVITY_M_S2;
@@ -71,7 +71,7 @@ pub(super) fn rolling_state(dynamics: &Dynamics, speed_m_s: f64, substep_s: f64)
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let steps = (SETTLING_TIME_S / substep_s).ceil() as u64;
     for _ in 0..steps {
-        state = rk4(dynamics, &state, &input, &ground, substep_s);
+        state = advanced(dynamics, &state, &input, &ground, substep_s);
     }
     state.position_m.x = 0.0;
     state.position_m.y = 0.0;
