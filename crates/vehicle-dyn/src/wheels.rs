@@ -80,6 +80,8 @@ pub struct WheelMotion {
 pub struct Contact {
     /// Load along the ground normal, N.
     pub load_n: f64,
+    /// How many of the wheel's tyres carry load.
+    pub tyres_down: u8,
     /// Radial compression of the tyre, m; negative is the gap under a lifted wheel. Of twin tyres
     /// the larger one.
     pub deflection_m: f64,
@@ -137,13 +139,17 @@ impl Wheel {
             tyre(self.half_twin_spacing_m),
             tyre(-self.half_twin_spacing_m),
         ];
-        let slip_rate = match (one.load_n > 0.0, other.load_n > 0.0) {
-            (true, false) => one.slip_rate,
-            (false, true) => other.slip_rate,
-            _ => [0, 1].map(|i| 0.5 * (one.slip_rate[i] + other.slip_rate[i])),
+        // By load, so that the wheel's slip follows the tyre that stays down without a jump.
+        let load = one.load_n + other.load_n;
+        let slip_rate = if load > 0.0 {
+            [0, 1]
+                .map(|i| (one.load_n * one.slip_rate[i] + other.load_n * other.slip_rate[i]) / load)
+        } else {
+            one.slip_rate
         };
         Contact {
-            load_n: one.load_n + other.load_n,
+            load_n: load,
+            tyres_down: one.tyres_down + other.tyres_down,
             deflection_m: one.deflection_m.max(other.deflection_m),
             clearance_m: one.clearance_m.min(other.clearance_m),
             elastic_j: one.elastic_j + other.elastic_j,
@@ -214,6 +220,7 @@ impl Wheel {
             * (tread_speed * ROLLING_FADE_S_PER_M).clamp(-1.0, 1.0);
         Contact {
             load_n: load,
+            tyres_down: u8::from(load > 0.0),
             deflection_m: deflection,
             clearance_m: (-deflection).max(0.0) * cos_camber,
             elastic_j: share * self.radial.energy_j(deflection),

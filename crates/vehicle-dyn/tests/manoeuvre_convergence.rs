@@ -7,9 +7,9 @@ const LTR_TOLERANCE: f64 = 1e-3;
 
 /// Holds every run of every manoeuvre against the tolerance. The two directions mirror each other,
 /// so both are compared and one is printed.
-fn hold(what: &str, difference: impl Fn(&RunConvergence) -> f64) {
+fn hold(what: &str, vehicles: &[&str], difference: impl Fn(&RunConvergence) -> f64) {
     let mut exceeded = Vec::new();
-    for vehicle_name in vehicle_dyn::vehicles::names() {
+    for &vehicle_name in vehicles {
         let vehicle = vehicle_dyn::vehicles::embedded(vehicle_name).expect("embedded");
         for name in manoeuvre::names() {
             let file = manoeuvre::find(name).expect("embedded");
@@ -34,16 +34,21 @@ fn hold(what: &str, difference: impl Fn(&RunConvergence) -> f64) {
 
 #[test]
 fn halving_the_step_changes_the_load_transfer_by_less_than_1e_3_while_each_side_carries() {
-    hold("before a whole side is off the ground", |run| {
+    // One of each kind: independent wheels; solid axles and twin tyres.
+    let vehicles = ["sedan", "utility-truck"];
+    hold("before a whole side is off the ground", &vehicles, |run| {
         run.ltr_difference_before_lift
     });
 }
 
-/// Where the sedan falls back on its wheels, LTR has spikes of up to 4, and what half the step changes
-/// in their timing is up to 0.18 (sine with dwell, after a spin). It shrinks slowly with the step: the
-/// forces of a wheel have kinks and jumps at touchdown.
+/// Where the sedan falls back on its wheels, LTR has spikes of up to 4, and a vehicle near tipping
+/// doubles a small difference every quarter of a second. With steps taken in parts at contact it holds for
+/// the sedan in all manoeuvres but the largest waves of the sine with dwell (up to 0.06).
 #[test]
-#[ignore = "does not hold after a side that lifted has touched down again: up to 0.18"]
+#[ignore = "does not hold after a side that lifted has touched down again: up to 0.06"]
 fn halving_the_step_changes_the_load_transfer_by_less_than_1e_3_also_after_touchdown() {
-    hold("over the whole of each run", |run| run.ltr_difference);
+    let vehicles = vehicle_dyn::vehicles::names();
+    hold("over the whole of each run", &vehicles, |run| {
+        run.ltr_difference
+    });
 }

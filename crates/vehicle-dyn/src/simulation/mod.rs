@@ -329,10 +329,10 @@ pub(crate) fn whole_substeps(tick_s: f64, substep_s: f64) -> Result<u64, Simulat
     Ok(whole as u64)
 }
 
-/// Parts of a step in which a wheel leaves the ground or touches down.
+/// Parts of a step in which a tyre leaves the ground or touches down.
 const CONTACT_PARTS: u32 = 16;
 
-/// One step, in parts when a wheel leaves the ground or touches down within it: there the forces have
+/// One step, in parts when a tyre leaves the ground or touches down within it: there the forces have
 /// a kink, which costs the integrator its order.
 fn advanced(
     dynamics: &Dynamics,
@@ -357,7 +357,7 @@ fn advanced(
     next
 }
 
-/// One classical Runge–Kutta step of fourth order, and whether the same wheels touched the ground in
+/// One classical Runge–Kutta step of fourth order, and whether the same tyres touched the ground in
 /// all its stages.
 fn rk4(
     dynamics: &Dynamics,
@@ -376,7 +376,7 @@ fn rk4(
         .advanced(&k3, step / 3.0)
         .advanced(&k4, step / 6.0);
     next.orientation /= next.orientation.norm();
-    let touching = |contacts: &[Contact; 4]| contacts.map(|contact| contact.load_n > 0.0);
+    let touching = |contacts: &[Contact; 4]| contacts.map(|contact| contact.tyres_down);
     let first = touching(&c1);
     let even = [c2, c3, c4]
         .iter()
