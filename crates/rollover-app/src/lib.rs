@@ -35,5 +35,6 @@ pub fn execute(command: &cli::Command, interrupt: &Interrupt) -> Result<()> {
         cli::Command::Run(args) => campaign::single(args, interrupt),
         cli::Command::Record(args) => campaign::record_only(args, interrupt),
         cli::Command::Identify(args) => identify::identify(args, interrupt),
+        cli::Command::Report(args) => report::command(args),
     }
 }

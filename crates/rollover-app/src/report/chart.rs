@@ -13,6 +13,8 @@ pub(super) struct Series<'a> {
     pub(super) points: Vec<(f64, f64)>,
     /// Whether a cross marks the last point: the run ended early.
     pub(super) cross: bool,
+    /// Lengths of line and gap, px; 0 for a whole line.
+    pub(super) dash: [u8; 2],
 }
 
 /// What the axes show.
@@ -24,25 +26,11 @@ pub(super) struct Axes<'a> {
     pub(super) y: (f64, f64),
 }
 
-/// Colour-blind safe hues (Okabe and Ito), dark enough on white.
-const PALETTE: [RGBColor; 6] = [
-    RGBColor(213, 94, 0),
-    RGBColor(0, 114, 178),
-    RGBColor(0, 158, 115),
-    RGBColor(170, 68, 153),
-    RGBColor(230, 159, 0),
-    RGBColor(86, 180, 233),
-];
 const INK: RGBColor = RGBColor(45, 49, 54);
 const GRID: RGBColor = RGBColor(226, 229, 233);
 /// Half the size of the mark where a run ended early, in pixels.
 const CROSS_SIZE: i32 = 6;
 const FONT: &str = "Helvetica, Arial, sans-serif";
-
-/// Colour of the `index`-th run of a figure.
-pub(super) fn run_colour(index: usize) -> RGBColor {
-    PALETTE[index % PALETTE.len()]
-}
 
 /// Thin grey line for limits and edges.
 pub(super) fn limit_style() -> ShapeStyle {
@@ -123,13 +111,27 @@ type Chart<'a, 'b> = ChartContext<'a, Backend<'b>, Cartesian2d<RangedCoordf64, R
 
 fn draw_series(chart: &mut Chart<'_, '_>, line: &Series<'_>) -> DrawResult {
     let style = line.style;
-    let drawn = chart.draw_series(LineSeries::new(line.points.iter().copied(), style))?;
-    if !line.name.is_empty() {
-        drawn
-            .label(line.name)
-            .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style.stroke_width(3)));
+    let mut named = line.name;
+    // A gap ends a stroke.
+    for stroke in line.points.split(|p| !(p.0.is_finite() && p.1.is_finite())) {
+        if stroke.is_empty() {
+            continue;
+        }
+        let points = stroke.iter().copied();
+        let drawn = if line.dash == [0, 0] {
+            chart.draw_series(LineSeries::new(points, style))?
+        } else {
+            let [on, off] = line.dash.map(i32::from);
+            chart.draw_series(DashedLineSeries::new(points, on, off, style))?
+        };
+        if !named.is_empty() {
+            drawn.label(named).legend(move |(x, y)| {
+                PathElement::new([(x, y), (x + 18, y)], style.stroke_width(3))
+            });
+            named = "";
+        }
     }
-    if let Some(&end) = line.points.last().filter(|_| line.cross) {
+    if let Some(&end) = line.points.iter().rfind(|p| line.cross && p.1.is_finite()) {
         let mark = Cross::new(end, CROSS_SIZE, line.style.color.stroke_width(3));
         chart.draw_series(std::iter::once(mark))?;
     }
