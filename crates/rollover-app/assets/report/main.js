@@ -11,6 +11,7 @@ const PRINT_WIDTH = 660;
 function forPaper(on) {
   if (printing === on) return;
   printing = on;
+  if (on) for (const details of document.querySelectorAll("details")) details.open = true;
   for (const scene of scenes) {
     for (const { u } of scene.plots) if (on) u.setSize({ width: PRINT_WIDTH, height: PLOT_HEIGHT - 20 });
     if (!on) scene.resize();

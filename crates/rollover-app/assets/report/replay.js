@@ -2,6 +2,18 @@
 
 const RATES = [0.1, 0.25, 0.5, 1, 2, 4];
 
+// The next picture; the clock goes on where the browser draws none, as for a covered window.
+function nextFrame(draw) {
+  let drawn = false;
+  const once = () => {
+    if (drawn) return;
+    drawn = true;
+    draw(performance.now());
+  };
+  requestAnimationFrame(once);
+  setTimeout(once, 250);
+}
+
 class Replay {
   constructor(scene) {
     this.scene = scene;
@@ -90,9 +102,9 @@ class Replay {
         this.draw();
         if (this.time >= this.scene.end) return this.pause();
       }
-      requestAnimationFrame(frame);
+      nextFrame(frame);
     };
-    requestAnimationFrame(frame);
+    nextFrame(frame);
   }
 
   pause() {

@@ -109,21 +109,30 @@ function drawCourse(canvas, scene, time) {
     context.setLineDash([]);
     if (run.ended_early) cross(context, view.x(run.at("x_m", run.end)), view.y(run.at("y_m", run.end)), 5, colour(run.look));
   }
-  for (const { run, letter } of scene.replay.pair()) {
-    if (!run.has("x_m", "y_m")) continue;
-    const [x, y] = [view.x(run.at("x_m", time)), view.y(run.at("y_m", time))];
+  drawPlaces(context, view, scene.replay.pair().filter(({ run }) => run.has("x_m", "y_m")), time);
+  scaleBar(context, view.scale, width, height);
+  return view;
+}
+
+// Where the vehicles of the replay are; letters side by side where they would hide each other.
+function drawPlaces(context, view, pair, time) {
+  const places = pair.map(({ run }) => [view.x(run.at("x_m", time)), view.y(run.at("y_m", time))]);
+  const close = places.length > 1 && Math.hypot(places[0][0] - places[1][0], places[0][1] - places[1][1]) < 16;
+  pair.forEach(({ run, letter }, index) => {
+    const [x, y] = places[index];
+    const shift = close ? (index ? 9 : -9) : 0;
     context.beginPath();
-    context.arc(x, y, 8, 0, 2 * Math.PI);
+    context.arc(x + shift, y - Math.abs(shift), 8, 0, 2 * Math.PI);
     context.fillStyle = colour(run.look);
     context.fill();
     context.fillStyle = ink().page;
     context.font = "bold 11px system-ui, sans-serif";
     context.textAlign = "center";
     context.textBaseline = "middle";
-    context.fillText(letter, x, y + 0.5);
-  }
-  scaleBar(context, view.scale, width, height);
-  return view;
+    context.fillText(letter, x + shift, y - Math.abs(shift) + 0.5);
+    if (close) context.fillStyle = colour(run.look);
+    if (close) context.fillRect(x - 1.5, y - 1.5, 3, 3);
+  });
 }
 
 function cross(context, x, y, size, stroke) {

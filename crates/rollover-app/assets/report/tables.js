@@ -137,7 +137,7 @@ function header() {
   const runs = report.scenes.reduce((sum, scene) => sum + scene.runs.length, 0);
   document.getElementById("top").append(
     el("h1", {}, report.title),
-    report.asked.map((text) => el("p", { class: "lead" }, text)),
+    ...report.asked.map((text) => el("p", { class: "lead" }, text)),
     el("p", { class: "soft" }, `${runs} run${runs === 1 ? "" : "s"}: ${words}.`),
     report.problems.length ? el("p", { class: "notice" },
       `${report.problems.length} problem${report.problems.length === 1 ? "" : "s"} with files: `,

@@ -73,7 +73,9 @@ function axleTilt(run, roll, track, time) {
   const side = Math.sign(roll) || 1;
   if (run.has("two_wheel_clearance_m")) {
     const clearance = run.at("two_wheel_clearance_m", time);
-    return side * Math.asin(Math.min(1, Math.max(0, clearance || 0) / track));
+    const tilt = Math.asin(Math.min(1, Math.max(0, clearance || 0) / track));
+    // Springs at full droop lower the wheels: the axle never leans more than the body.
+    return side * Math.min(tilt, Math.abs(roll));
   }
   const lifted = run.lifted(time);
   const off = (lifted[0] && lifted[2]) || (lifted[1] && lifted[3]);
@@ -112,6 +114,8 @@ function drawFromBehind(context, scene, { run, letter }, time, region) {
   context.clip();
   context.translate(middle, ground);
   context.scale(scale, -scale);
+  // The picture follows a vehicle that tips.
+  context.translate(-outer * (1 - Math.cos(tilt)) - 0.7 * Math.sin(tilt), 0);
   // The axles turn about the wheels that stay on the ground.
   context.translate(outer, 0);
   context.rotate(-tilt);
@@ -141,12 +145,12 @@ function drawFromBehind(context, scene, { run, letter }, time, region) {
   context.fillStyle = colour(run.look);
   context.font = "bold 14px system-ui, sans-serif";
   context.textAlign = "left";
-  context.fillText(letter, left + 8, ground - 12);
+  context.fillText(letter, left + 10, top + 8);
   if (run.has("roll_deg")) {
     context.textAlign = "right";
     context.font = "12px system-ui, sans-serif";
     context.fillStyle = colours.soft;
-    context.fillText(`roll ${fixed(run.smoothRoll(time), 1)}°`, left + width - 8, ground - 10);
+    context.fillText(`roll ${fixed(run.smoothRoll(time), 1)}°`, left + width - 10, top + 8);
   }
   if (loads) drawLoads(context, run, loads, { x: left, y: ground + 14, width, height: barsHeight - 4, full: run.fullLoad });
   context.restore();
@@ -257,7 +261,8 @@ function drawLoads(context, run, loads, { x, y, width, height, full }) {
     context.fillRect(centre - bar / 2, y + tall - level, bar, level);
     context.font = "11px system-ui, sans-serif";
     context.fillStyle = up ? colours.warn : colours.soft;
-    context.fillText(up ? "lifted" : known(load) ? `${fixed(load / 1000, 1)} kN` : NONE, centre, y + tall + 9);
+    const unit = width > 200 ? " kN" : "";
+    context.fillText(up ? "lifted" : known(load) ? `${fixed(load / 1000, 1)}${unit}` : NONE, centre, y + tall + 9);
     context.fillText(name, centre, y + tall + 22);
   }
 }

@@ -3,6 +3,7 @@
 use anyhow::{Result, anyhow};
 use plotters::coord::Shift;
 use plotters::coord::types::RangedCoordf64;
+use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 
 /// One line of a chart.
@@ -125,8 +126,11 @@ fn draw_series(chart: &mut Chart<'_, '_>, line: &Series<'_>) -> DrawResult {
             chart.draw_series(DashedLineSeries::new(points, on, off, style))?
         };
         if !named.is_empty() {
+            // A dashed line is dashed in the legend, too; a whole one has a dash longer than that.
+            let dash = if line.dash == [0, 0] { (40, 1) } else { (7, 4) };
             drawn.label(named).legend(move |(x, y)| {
-                PathElement::new([(x, y), (x + 18, y)], style.stroke_width(3))
+                let points = [(x, y), (x + 18, y)];
+                DashedPathElement::new(points, dash.0, dash.1, style.stroke_width(3))
             });
             named = "";
         }

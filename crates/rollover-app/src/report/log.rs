@@ -198,7 +198,7 @@ impl<'a> Reading<'a> {
                 self.note(Some(line), reason);
                 continue;
             }
-            if !whole && reader.is_done() {
+            if !whole && reader.position().byte() >= bytes.len() as u64 {
                 self.note(
                     Some(line),
                     "does not end; this line is left out, the others are shown",

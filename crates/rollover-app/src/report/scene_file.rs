@@ -42,7 +42,7 @@ impl SceneFile {
         let settings = scenario.controllers.get(controller);
         let scene = Scene {
             name: scenario.name.clone(),
-            title: format!("{}: {}", scenario.name, vehicle.name),
+            title: format!("{}, vehicle {}", scenario.name, vehicle.name),
             description: scenario.description.clone(),
             road: Some(Road::new(&scenario.course)?),
             vehicle: Some(VehicleShape::of(vehicle)),

@@ -50,9 +50,8 @@ fn a_folder_with_a_cut_log_is_reported_and_the_file_named() {
 #[test]
 fn a_log_of_a_real_vehicle_is_reported() {
     let folder = folder();
-    let rows: String = (0..300)
-        .map(|k| format!("{:.2},{},{}\n", f64::from(k) / 50.0, 80 + k % 7, k % 30))
-        .collect();
+    let row = |k: u32| format!("{:.2},{},{}", f64::from(k) / 50.0, 80 + k % 7, k % 30);
+    let rows = (0..300).map(row).collect::<Vec<_>>().join("\n");
     std::fs::write(
         folder.path().join("drive.csv"),
         format!("Time,VehSpd,SteerAng\n{rows}"),

@@ -112,8 +112,8 @@ fn spoilt_lines_in_the_middle_are_left_out() {
 
 #[test]
 fn one_kind_of_problem_is_told_once() {
-    let rows: String = (0..500).map(|k| format!("{k},?\n")).collect();
-    let table = parse_text(&format!("time_s,ltr\n{rows}"));
+    let rows: Vec<String> = (0..500).map(|k| format!("{k},?")).collect();
+    let table = parse_text(&format!("time_s,ltr\n{}\n", rows.join("\n")));
     assert_says(&problem(&table), &["line 2", "first of 500", "`ltr`"]);
     assert!(!table.columns.contains_key("ltr"), "it holds no number");
 }
@@ -210,12 +210,9 @@ fn a_log_cut_short_is_judged_by_what_is_there() {
 fn a_rollover_is_seen_in_the_log_alone() {
     let folder = folder();
     let path = folder.path().join("car.csv");
-    let rows = (0..100).map(|k| format!("{},{}\n", f64::from(k) / 10.0, f64::from(k) * 0.7));
-    std::fs::write(
-        &path,
-        format!("time_s,roll_deg\n{}", rows.collect::<String>()),
-    )
-    .expect("writable");
+    let row = |k: u32| format!("{},{}", f64::from(k) / 10.0, f64::from(k) * 0.7);
+    let rows = (0..100).map(row).collect::<Vec<_>>().join("\n");
+    std::fs::write(&path, format!("time_s,roll_deg\n{rows}\n")).expect("writable");
     let report = collect_one(path);
     assert_eq!(report.scenes[0].runs[0].outcome, Some(Outcome::RolledOver));
     assert_eq!(report.scenes[0].runs[0].label, "car");

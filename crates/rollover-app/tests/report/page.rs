@@ -1,6 +1,6 @@
 //! The page as text: nothing of it is loaded, nothing that data bring along can run.
 
-use rollover_app::report::data::{Columns, Report, Run, Scene, Verdict};
+use rollover_app::report::data::{Columns, Report, Role, Run, Scene, Verdict};
 use rollover_app::report::html;
 
 use super::{assert_says, full, run, scene};
@@ -87,7 +87,7 @@ fn many_long_runs_stay_below_five_megabytes() {
     let mut scene = scene();
     let long = run(
         "rd-deepc-1",
-        Default::default(),
+        Role::default(),
         6000,
         0.9,
         vehicle_dyn::metrics::Outcome::Completed,
