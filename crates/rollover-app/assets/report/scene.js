@@ -133,7 +133,8 @@ class SceneView {
     this.times = times;
     this.drawLoadsPlot();
     if (this.profile) this.add(profilePlot(this));
-    new ResizeObserver(() => this.resize()).observe(this.plotsBox);
+    // Not within the observer: a plot that grows would call it again.
+    new ResizeObserver(() => requestAnimationFrame(() => this.resize())).observe(this.plotsBox);
     repaints.push(() => {
       for (const { u } of this.plots) u.redraw(false);
       this.replay.draw();
@@ -212,6 +213,8 @@ class SceneView {
   }
 
   resize() {
+    // Paper has its own width.
+    if (printing) return;
     for (const plot of this.plots) plot.resize();
     if (this.replay) this.replay.draw();
   }

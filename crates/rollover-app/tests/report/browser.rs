@@ -17,6 +17,14 @@ const BROWSERS: [&str; 5] = [
     "chrome",
 ];
 
+const WIDE: &str = "--window-size=1300,900";
+const DARK: &str = "--blink-settings=preferredColorScheme=0";
+
+/// A window cannot be as narrow as a telephone; a frame can.
+const NARROW: &str = r#"<!DOCTYPE html><iframe src="report.html#selftest" style="width:380px;height:760px"></iframe>
+<script>addEventListener("message", (event) =>
+  (document.documentElement.dataset.selftest = JSON.stringify(event.data.selftest)))</script>"#;
+
 /// What `ROLLOVER_BROWSER` names, else one in the path.
 fn browser() -> Option<PathBuf> {
     let named = std::env::var_os("ROLLOVER_BROWSER").map(PathBuf::from);
@@ -35,7 +43,7 @@ fn browser() -> Option<PathBuf> {
 }
 
 /// Opens the page and returns what its self-test found.
-fn selftest(browser: &Path, folder: &Path, page: &Path, size: &str) -> serde_json::Value {
+fn selftest(browser: &Path, folder: &Path, page: &Path, more: &[&str]) -> serde_json::Value {
     let output = Command::new(browser)
         .args([
             "--headless",
@@ -50,7 +58,7 @@ fn selftest(browser: &Path, folder: &Path, page: &Path, size: &str) -> serde_jso
             "--virtual-time-budget=60000",
             "--dump-dom",
         ])
-        .arg(format!("--window-size={size}"))
+        .args(more)
         .arg(format!(
             "--user-data-dir={}",
             folder.join("profile").display()
@@ -68,7 +76,7 @@ fn selftest(browser: &Path, folder: &Path, page: &Path, size: &str) -> serde_jso
     serde_json::from_str(&found.replace("&quot;", "\"").replace("&amp;", "&")).expect("JSON")
 }
 
-fn passes(report: &Report, size: &str) -> Option<serde_json::Value> {
+fn passes(report: &Report, narrow: bool, more: &[&str]) -> Option<serde_json::Value> {
     let Some(browser) = browser() else {
         eprintln!(
             "skipped: no Chromium is installed; install one, or name it in ROLLOVER_BROWSER, to test the page"
@@ -78,14 +86,17 @@ fn passes(report: &Report, size: &str) -> Option<serde_json::Value> {
     let folder = folder();
     let page = folder.path().join("report.html");
     std::fs::write(&page, html(report).expect("a page")).expect("writable");
-    let found = selftest(&browser, folder.path(), &page, size);
+    let frame = folder.path().join("frame.html");
+    std::fs::write(&frame, NARROW).expect("writable");
+    let opened = if narrow { &frame } else { &page };
+    let found = selftest(&browser, folder.path(), opened, more);
     assert_eq!(found["ok"], true, "{found:#}");
     Some(found)
 }
 
 #[test]
 fn plots_replay_cursor_and_keys_work() {
-    if let Some(found) = passes(&full(), "1300,900") {
+    if let Some(found) = passes(&full(), false, &[WIDE]) {
         // Nine over time, wheel loads, the ground.
         assert_eq!(found["plots"], 11);
         assert!(
@@ -97,7 +108,12 @@ fn plots_replay_cursor_and_keys_work() {
 
 #[test]
 fn a_narrow_screen_does_not_scroll_sideways() {
-    passes(&full(), "500,800");
+    passes(&full(), true, &[WIDE]);
+}
+
+#[test]
+fn a_dark_screen_shows_the_same() {
+    passes(&full(), false, &[WIDE, DARK]);
 }
 
 #[test]
@@ -122,8 +138,8 @@ fn a_log_that_says_little_is_shown() {
         scenes: vec![scene],
         ..Report::default()
     };
-    if let Some(found) = passes(&report, "1300,900") {
+    if let Some(found) = passes(&report, false, &[WIDE]) {
         assert_eq!(found["plots"], 1);
     }
-    passes(&Report::default(), "1300,900");
+    passes(&Report::default(), false, &[WIDE]);
 }
