@@ -20,6 +20,7 @@ use job::{Job, RunResult, cores, remove_old_results, run_all, step_bar};
 
 /// The main job's scenario and controllers.
 const PAPER_SCENARIO: &str = "sedan-s1";
+const PAPER_QUESTION: &str = "Does a controller that knows the vehicle only from a recorded drive keep it on its wheels where the driver alone rolls over? And how does control on a model identified from the same recording do?";
 const PAPER_CONTROLLERS: [&str; 6] = [
     DRIVER,
     "rd-deepc-1",
@@ -62,7 +63,7 @@ pub fn paper(args: &PaperArgs, interrupt: &Interrupt) -> Result<()> {
     let folders = PAPER_CONTROLLERS.map(|controller| args.out.join(controller));
     let mut report = report::collect(&folders, &report::log::Renamed::new());
     report.title = format!("Rollover prevention: {} on {}", vehicle.name, scenario.name);
-    report.asked = vec![scenario.description.clone()];
+    report.asked = vec![PAPER_QUESTION.into()];
     report.provenance.command = format!("rollover-app paper --seed {}", args.seed);
     let written = report::write(&report, &args.out.join(REPORT_FILE))?;
     if args.json {

@@ -25,6 +25,15 @@ pub(super) struct Axes<'a> {
     pub(super) y_label: &'a str,
     pub(super) x: (f64, f64),
     pub(super) y: (f64, f64),
+    /// Fields filled with grey under the lines.
+    pub(super) fields: Vec<Field>,
+}
+
+/// A rectangle and its grey, 0 to 255.
+pub(super) struct Field {
+    pub(super) low: (f64, f64),
+    pub(super) high: (f64, f64),
+    pub(super) grey: u8,
 }
 
 const INK: RGBColor = RGBColor(45, 49, 54);
@@ -93,6 +102,10 @@ fn draw(
         .bold_line_style(GRID)
         .light_line_style(TRANSPARENT)
         .draw()?;
+    chart.draw_series(axes.fields.iter().map(|field| {
+        let grey = RGBColor(field.grey, field.grey, field.grey);
+        Rectangle::new([field.low, field.high], grey.filled())
+    }))?;
     for line in series {
         draw_series(&mut chart, line)?;
     }

@@ -3,8 +3,8 @@
 use anyhow::Result;
 use plotters::prelude::{Color, RGBColor, ShapeStyle};
 
-use super::chart::{Axes, Series, limit_style, line_chart, run_width};
-use super::data::{Point, Report, Run, Scene};
+use super::chart::{Axes, Field, Series, limit_style, line_chart, run_width};
+use super::data::{Point, Report, Run, Scene, TerrainMap};
 use super::log::TIME;
 use super::pack::{Grid, Thinning};
 use super::plots::{Look, PLOTS, Plot, WHEEL_LOADS, looks};
@@ -39,6 +39,8 @@ pub const FIGURE_ENDS: [&str; 12] = [
 const WIDE: (u32, u32) = (920, 400);
 /// Instants in a figure: two for each of its pixels.
 const INSTANTS: f64 = 1600.0;
+/// Fields of a terrain of which more would make the figure slow to draw.
+const MOST_FIELDS: usize = 6000;
 /// Runs of which more would hide one another in a figure.
 const MOST_RUNS: usize = 8;
 /// Colours and names of the wheel loads, in the order of their columns.
@@ -164,6 +166,7 @@ fn time_plot(scene: &Scene, plot: &Plot) -> Result<Option<Figure>> {
         y_label: plot.axis,
         x: (x.0, x.1.max(x.0 + 1e-3)),
         y: (low - margin, high + margin + legend),
+        fields: Vec::new(),
     };
     figure(
         scene,
@@ -208,6 +211,7 @@ fn wheel_loads(scene: &Scene) -> Result<Vec<Figure>> {
             y_label: "kN",
             x: (x.0, x.1.max(x.0 + 1e-3)),
             y: (y.0.min(0.0), (1.35 * y.1).max(1.0)),
+            fields: Vec::new(),
         };
         drawn.push(Figure {
             name: format!(
@@ -267,9 +271,55 @@ fn road(scene: &Scene) -> Result<Option<Figure>> {
         y_label: "y / m",
         x,
         y,
+        fields: scene
+            .terrain
+            .as_ref()
+            .map_or_else(Vec::new, |map| heights(map, x, y)),
     };
     let caption = "The road's edges and where the vehicles went.";
     figure(scene, "road", caption, line_chart(size, &axes, &lines)?)
+}
+
+/// Heights within a view as fields, dark where low; neighbours share one where there are too many.
+fn heights(map: &TerrainMap, x: (f64, f64), y: (f64, f64)) -> Vec<Field> {
+    let known = map.heights_m.iter().copied().filter(|h| h.is_finite());
+    let (low, high) = known.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| {
+        (low.min(h), high.max(h))
+    });
+    let span = (high - low).max(1e-9);
+    let mut stride = 1;
+    while (map.columns / stride) * (map.rows / stride) > MOST_FIELDS {
+        stride += 1;
+    }
+    let size = stride as f64 * map.spacing_m;
+    let mut fields = Vec::new();
+    for row in (0..map.rows).step_by(stride) {
+        for column in (0..map.columns).step_by(stride) {
+            let height = map.heights_m.get(row * map.columns + column);
+            let Some(height) = height.filter(|h| h.is_finite()) else {
+                continue;
+            };
+            let left = map.x_min_m + (column as f64 - 0.5) * map.spacing_m;
+            let bottom = map.y_min_m + (row as f64 - 0.5) * map.spacing_m;
+            let low_corner = (left.max(x.0), bottom.max(y.0));
+            let high_corner = ((left + size).min(x.1), (bottom + size).min(y.1));
+            if low_corner.0 >= high_corner.0 || low_corner.1 >= high_corner.1 {
+                continue;
+            }
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "between 176 and 246"
+            )]
+            let grey = (176.0 + 70.0 * (height - low) / span) as u8;
+            fields.push(Field {
+                low: low_corner,
+                high: high_corner,
+                grey,
+            });
+        }
+    }
+    fields
 }
 
 fn profile(scene: &Scene) -> Result<Option<Figure>> {
@@ -304,6 +354,7 @@ fn profile(scene: &Scene) -> Result<Option<Figure>> {
         y_label: "mm",
         x,
         y: (y.0 - 5.0, y.1 + 5.0 + 0.25 * (y.1 - y.0)),
+        fields: Vec::new(),
     };
     let caption = "Height under the wheels along the centre line.";
     figure(scene, "terrain", caption, line_chart(WIDE, &axes, &lines)?)

@@ -13,6 +13,14 @@ fn every_plot_has_a_figure() {
         let there = names.iter().any(|name| name.ends_with(&format!("-{end}")));
         assert!(there, "no figure `{end}` in {names:?}");
     }
+    let road = figures
+        .iter()
+        .find(|f| f.name == "turn-road")
+        .expect("it is there");
+    assert!(
+        road.svg.matches("<rect").count() > 1000,
+        "the ground is drawn"
+    );
     for figure in &figures {
         let ours = FIGURE_ENDS.iter().any(|end| figure.name.ends_with(end));
         assert!(ours, "an old `{}` would not be removed", figure.name);
