@@ -5,7 +5,6 @@ class RunView {
   constructor(data, grid) {
     Object.assign(this, data);
     this.grid = grid;
-    this.shown = true;
     this.column = {};
     for (const [name, packed] of Object.entries(data.columns)) this.column[name] = unpack(packed);
     const end = data.figures.end_time_s;
@@ -93,7 +92,7 @@ class SceneView {
   build() {
     this.replay = new Replay(this);
     this.toggles = this.runs.map((run) => el("button", {
-      type: "button", class: "toggle", "aria-pressed": "true", title: run.description || undefined,
+      type: "button", class: "toggle", "aria-pressed": String(run.shown), title: run.description || undefined,
       onclick: () => this.toggle(run),
     }, swatch(run.look), el("span", {}, run.label), outcomeBadge(run)));
     this.plotsBox = el("div", { class: "plots" });
@@ -109,7 +108,9 @@ class SceneView {
       runsTable(this),
       notes.length ? el("details", {}, el("summary", {}, "What the controllers are"),
         el("dl", { class: "facts" }, notes.map((run) => [el("dt", {}, run.label), el("dd", {}, run.description)]))) : "",
-      el("div", { class: "toggles", role: "group", "aria-label": "Runs shown in the plots" }, this.toggles),
+      el("div", { class: "toggles", role: "group", "aria-label": "Runs shown in the plots" }, this.toggles,
+        this.runs.length > 3 ? [el("button", { type: "button", onclick: () => this.showAll(true) }, "All"),
+          el("button", { type: "button", onclick: () => this.showAll(false) }, "None")] : null),
       el("p", { class: "soft small-print hint" }, "Drag over a plot to zoom, double click to see all, click to move the replay. Press ? for keys."),
       el("div", { class: "stage" }, this.plotsBox, this.replay.element));
   }
@@ -139,6 +140,8 @@ class SceneView {
       for (const { u } of this.plots) u.redraw(false);
       this.replay.draw();
     });
+    // Of many runs only one of each controller is drawn at first.
+    for (const run of this.runs.filter((one) => !one.shown)) this.show(run, false);
     this.resize();
     this.replay.draw();
   }
@@ -178,13 +181,22 @@ class SceneView {
   }
 
   toggle(run) {
-    run.shown = !run.shown;
-    this.toggles[this.runs.indexOf(run)].setAttribute("aria-pressed", String(run.shown));
-    for (const { u, lines } of this.plots)
-      lines.forEach((line, index) => {
-        if (line.owner === run) u.setSeries(index + 1, { show: run.shown });
-      });
+    this.show(run, !run.shown);
     this.replay.draw();
+  }
+
+  showAll(shown) {
+    for (const run of this.runs) this.show(run, shown);
+    this.replay.draw();
+  }
+
+  show(run, shown) {
+    run.shown = shown;
+    this.toggles[this.runs.indexOf(run)].setAttribute("aria-pressed", String(shown));
+    for (const { u, lines } of this.plots)
+      u.batch(() => lines.forEach((line, index) => {
+        if (line.owner === run) u.setSeries(index + 1, { show: shown });
+      }));
   }
 
   // Values beside the cursor, or at the replay's time when there is none.

@@ -48,7 +48,15 @@ pub fn collect(paths: &[PathBuf], renamed: &Renamed) -> Report {
     }
     for scene in &mut report.scenes {
         name_apart(&mut scene.runs);
-        scene.runs.sort_by_key(|run| order(run.role));
+        let names: Vec<String> = scene
+            .runs
+            .iter()
+            .map(|run| run.controller.clone())
+            .collect();
+        scene.runs.sort_by_key(|run| {
+            let place = names.iter().position(|name| *name == run.controller);
+            (order(run.role), place, run.mirrored, run.seed)
+        });
         if scene.vehicle.is_none() {
             report.notes.push(format!(
                 "{}: the logs do not say what vehicle it was; the replay draws {} with typical measures.",

@@ -7,7 +7,7 @@ use super::chart::{Axes, Field, Series, limit_style, line_chart, run_width};
 use super::data::{Point, Report, Run, Scene, TerrainMap};
 use super::log::TIME;
 use super::pack::{Grid, Thinning};
-use super::plots::{Look, PLOTS, Plot, WHEEL_LOADS, looks};
+use super::plots::{Look, PLOTS, Plot, WHEEL_LOADS, drawn_first, looks};
 
 /// A drawn figure.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -41,8 +41,6 @@ const WIDE: (u32, u32) = (920, 400);
 const INSTANTS: f64 = 1600.0;
 /// Fields of a terrain of which more would make the figure slow to draw.
 const MOST_FIELDS: usize = 6000;
-/// Runs of which more would hide one another in a figure.
-const MOST_RUNS: usize = 8;
 /// Colours and names of the wheel loads, in the order of their columns.
 const WHEELS: [(&str, RGBColor, [u8; 2]); 4] = [
     ("front left", RGBColor(0, 95, 173), [0, 0]),
@@ -83,8 +81,10 @@ pub(super) fn file_name(text: &str) -> String {
 
 fn shown(scene: &Scene) -> impl Iterator<Item = (usize, &Run, Look)> {
     let looks = looks(&scene.runs);
-    let runs = scene.runs.iter().zip(looks).take(MOST_RUNS).enumerate();
-    runs.map(|(index, (run, look))| (index, run, look))
+    let drawn = drawn_first(&scene.runs);
+    let runs = scene.runs.iter().zip(looks).zip(drawn);
+    let runs = runs.filter(|(_, drawn)| *drawn).enumerate();
+    runs.map(|(index, ((run, look), _))| (index, run, look))
 }
 
 fn colour(look: Look) -> RGBColor {

@@ -14,7 +14,7 @@ use vehicle_dyn::metrics::Outcome;
 use super::data::{Columns, Report, Scene, TerrainMap, VehicleShape};
 use super::log::TIME;
 use super::pack::{Grid, Packed, Thinning, unwrapped_deg};
-use super::plots::{PLOTS, looks, page_columns};
+use super::plots::{PLOTS, drawn_first, looks, page_columns};
 
 const STYLES: &str = concat!(
     include_str!("../../assets/report/uPlot.min.css"),
@@ -147,10 +147,12 @@ fn scene_data(scene: &Scene, step_s: f64) -> Result<Value> {
     };
     let looks = looks(&scene.runs);
     let mut runs = Vec::with_capacity(scene.runs.len());
-    for (run, look) in scene.runs.iter().zip(looks) {
+    let drawn = drawn_first(&scene.runs);
+    for ((run, look), drawn) in scene.runs.iter().zip(looks).zip(drawn) {
         let mut bare = run.clone();
         bare.columns.clear();
         let mut data = serde_json::to_value(&bare)?;
+        data["shown"] = drawn.into();
         data["look"] = serde_json::to_value(look)?;
         data["ended_early"] =
             matches!(run.outcome, Some(Outcome::RolledOver | Outcome::SpunOut)).into();

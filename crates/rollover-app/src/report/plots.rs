@@ -241,10 +241,16 @@ const OTHER: [Look; 4] = [
     look([60, 64, 70], [220, 224, 230], [12, 4]),
 ];
 
-/// The looks of a scene's runs, in their order.
+/// The looks of a scene's runs, in their order. Runs of one controller look the same.
 pub(super) fn looks(runs: &[Run]) -> Vec<Look> {
-    let mut seen: Vec<Role> = Vec::new();
-    let mut next = |run: &Run| {
+    let mut seen: Vec<(Role, &str)> = Vec::new();
+    for run in runs {
+        let driven = (run.role, run.controller.as_str());
+        if !seen.contains(&driven) {
+            seen.push(driven);
+        }
+    }
+    let look_of = |run: &Run| {
         let looks: &[Look] = match run.role {
             Role::Driver => &DRIVER,
             Role::Deepc => &DEEPC,
@@ -252,9 +258,26 @@ pub(super) fn looks(runs: &[Run]) -> Vec<Look> {
             Role::Floor => &FLOOR,
             Role::Other => &OTHER,
         };
-        let place = seen.iter().filter(|role| **role == run.role).count();
-        seen.push(run.role);
-        looks[place % looks.len()]
+        let of_role = seen.iter().filter(|(role, _)| *role == run.role);
+        let place = of_role
+            .map(|(_, name)| *name)
+            .position(|name| name == run.controller);
+        looks[place.unwrap_or(0) % looks.len()]
     };
-    runs.iter().map(&mut next).collect()
+    runs.iter().map(look_of).collect()
+}
+
+/// Runs of which more would hide one another in a plot.
+const MOST_RUNS: usize = 8;
+
+/// Which runs are drawn at first: all, or of many one of each controller.
+pub(super) fn drawn_first(runs: &[Run]) -> Vec<bool> {
+    let first_of_its_kind = |(index, run): (usize, &Run)| {
+        runs.len() <= MOST_RUNS || {
+            let before = runs[..index].iter();
+            let mut same = before.filter(|r| r.role == run.role && r.controller == run.controller);
+            same.next().is_none()
+        }
+    };
+    runs.iter().enumerate().map(first_of_its_kind).collect()
 }

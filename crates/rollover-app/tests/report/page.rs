@@ -143,3 +143,26 @@ fn verdicts_follow_the_rule() {
         assert_eq!(Verdict::of_fraction(fraction).to_string(), verdict);
     }
 }
+
+#[test]
+fn of_many_runs_one_of_each_controller_is_drawn_at_first() {
+    let mut scene = scene();
+    let seeds = scene.runs.clone();
+    for seed in 11..14 {
+        scene.runs.extend(seeds.iter().cloned().map(|mut run| {
+            run.label = format!("{}, seed {seed}", run.controller);
+            run.seed = Some(seed);
+            run
+        }));
+    }
+    let report = Report {
+        scenes: vec![scene],
+        ..Report::default()
+    };
+    let data = data(&html(&report).expect("a page"));
+    let runs = data["scenes"][0]["runs"].as_array().expect("runs");
+    let shown = |n: usize| runs[n]["shown"].as_bool().expect("it is said");
+    assert!((0..3).all(shown) && !(3..12).any(shown));
+    assert_eq!(runs[1]["look"], runs[4]["look"], "one controller, one look");
+    assert_ne!(runs[1]["look"], runs[2]["look"]);
+}
