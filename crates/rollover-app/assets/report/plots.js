@@ -100,7 +100,8 @@ function timePlot(scene, { title, axis, caption, digits, atLeast, limits, name }
     legend: { show: false },
     scales: { x: { time: false }, y: { range: (u, low, high) => verticalRange(low, high, atLeast, limits) } },
     axes: axes(axis),
-    cursor: { sync: { key: scene.key, setSeries: false }, drag: { x: true, y: false }, y: false, points: { size: 7 } },
+    // What a click is, and what the end of a drag, is told apart below.
+    cursor: { sync: { key: scene.key, setSeries: false }, drag: { x: true, y: false, click: () => {} }, y: false, points: { size: 7 } },
     series: [{}, ...lines.map((line) => ({
       label: line.label,
       stroke: () => colour(line.look, line.thin ? 0.55 : 1),
@@ -137,7 +138,7 @@ function timePlot(scene, { title, axis, caption, digits, atLeast, limits, name }
     // Values at an instant.
     show(index) {
       for (const { line, text, chip } of labels) {
-        const visible = u.series[lines.indexOf(line) + 1].show;
+        const visible = !line.owner || line.owner.shown;
         chip.hidden = !visible;
         if (visible) text.textContent = `${fixed(line.values[index], digits)}`;
       }
