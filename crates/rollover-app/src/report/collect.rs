@@ -281,12 +281,34 @@ fn name_apart(runs: &mut [Run]) {
             run.label = format!("{}, seed {seed}", run.label);
         }
     }
-    let labels: Vec<String> = runs.iter().map(|run| run.label.clone()).collect();
+    let known: Vec<(String, String)> = runs
+        .iter()
+        .map(|run| (run.label.clone(), run.source.clone()))
+        .collect();
     for run in runs.iter_mut() {
-        if labels.iter().filter(|label| **label == run.label).count() > 1 {
-            run.label = format!("{} ({})", run.label, run.source);
+        let same = known.iter().filter(|(label, _)| *label == run.label);
+        let files: Vec<&Path> = same.map(|(_, source)| Path::new(source)).collect();
+        if files.len() > 1 {
+            run.label = format!(
+                "{} ({})",
+                run.label,
+                own_part(Path::new(&run.source), &files)
+            );
         }
     }
+}
+
+/// What a file's path has that those beside it do not begin with.
+fn own_part(file: &Path, files: &[&Path]) -> String {
+    let shared = |folder: &&Path| files.iter().all(|other| other.starts_with(folder));
+    let folder = file.ancestors().skip(1).find(shared);
+    let own = folder.and_then(|folder| file.strip_prefix(folder).ok());
+    let own = own.unwrap_or(file);
+    let own = match own.parent() {
+        Some(parent) if own.ends_with(LOG_FILE) && parent != Path::new("") => parent,
+        _ => own,
+    };
+    own.display().to_string()
 }
 
 /// Whether a report shows anything.

@@ -226,3 +226,19 @@ fn a_log_without_roll_has_no_outcome() {
     std::fs::write(&path, "time_s,speed_kmh\n0,100\n1,99\n").expect("writable");
     assert_eq!(collect_one(path).scenes[0].runs[0].outcome, None);
 }
+
+#[test]
+fn runs_of_one_name_are_told_apart_by_their_folders() {
+    let folder = folder();
+    for name in ["a/driver", "b/driver"] {
+        let path = folder.path().join(name).join("log.csv");
+        write_log(&path, 20);
+    }
+    let report = collect_one(folder.path().to_path_buf());
+    let labels: Vec<&str> = report.scenes[0]
+        .runs
+        .iter()
+        .map(|run| run.label.as_str())
+        .collect();
+    assert_eq!(labels, ["driver (a/driver)", "driver (b/driver)"]);
+}
