@@ -16,9 +16,9 @@ pub struct Cli {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// The main job: the paper's sedan scenario with each controller, a table and a page of figures.
+    /// The main job: the paper's sedan scenario with each controller, a table and a report.
     Paper(PaperArgs),
-    /// One scenario with one controller: log, summary and figures.
+    /// One scenario with one controller: log, summary and report.
     Run(RunArgs),
     /// The ground of a scenario: a file to run on and to look into, and a picture.
     Terrain(TerrainArgs),
@@ -31,6 +31,32 @@ pub enum Command {
     Manoeuvre(ManoeuvreArgs),
     /// Lists the built-in vehicles; checks and shows vehicle files.
     Vehicles(VehiclesArgs),
+    /// Makes the interactive report from logs alone, also logs of a real vehicle.
+    Report(ReportArgs),
+}
+
+/// Arguments of `report`.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "What cannot be read is named on standard error and in the page; the rest is shown. The exit status is 0 if any log was shown, 1 if none was or the page cannot be written, 2 for a wrong command line."
+)]
+pub struct ReportArgs {
+    /// Folders, searched for `log.csv` at any depth, or CSV files.
+    #[arg(required = true, value_name = "DIR|LOG.csv")]
+    pub paths: Vec<PathBuf>,
+    /// The page; by default `report.html` in the first folder, or here. Figures and tables go into
+    /// folders beside it.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Name of a column in the files that differs from ours, for example `speed_kmh=VehSpd`.
+    #[arg(long, value_name = "OURS=THEIRS", value_parser = column_name)]
+    pub column: Vec<(String, String)>,
+    /// Heading of the page.
+    #[arg(long, value_name = "TEXT")]
+    pub title: Option<String>,
+    /// Print the runs' numbers and the problems as JSON on standard output.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Arguments of `paper`.
@@ -221,6 +247,20 @@ fn friction(text: &str) -> Result<f64, String> {
         Ok(friction) => Err(format!("{friction} is not in [0.01, 1.5]")),
         Err(_) => Err("not a number".into()),
     }
+}
+
+fn column_name(text: &str) -> Result<(String, String), String> {
+    let (ours, theirs) = text
+        .split_once('=')
+        .ok_or("write OURS=THEIRS, for example speed_kmh=VehSpd")?;
+    let known = crate::report::log::COLUMN_NAMES;
+    if known.contains(&ours) {
+        return Ok((ours.into(), theirs.into()));
+    }
+    Err(format!(
+        "a log has no column `{ours}`, but {}",
+        known.join(", ")
+    ))
 }
 
 fn speed_kmh(text: &str) -> Result<f64, String> {

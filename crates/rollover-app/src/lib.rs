@@ -42,5 +42,6 @@ pub fn execute(command: &cli::Command, interrupt: &Interrupt) -> Result<()> {
         cli::Command::Identify(args) => identify::identify(args, interrupt),
         cli::Command::Manoeuvre(args) => manoeuvre::manoeuvre(args, interrupt),
         cli::Command::Vehicles(args) => vehicles_command::vehicles(args),
+        cli::Command::Report(args) => report::command(args),
     }
 }

@@ -7,19 +7,17 @@ use std::sync::{Mutex, PoisonError};
 use anyhow::{Context, Result, anyhow};
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use sysid::{Identification, Progress};
-use vehicle_dyn::metrics::Outcome;
 use vehicle_dyn::parameters::VehicleParameters;
-use vehicle_dyn::road::Course;
 use vehicle_dyn::terrain::Terrain;
 
 use crate::closed_loop::{self, Built, Recorded, Run, Watch};
 use crate::interrupt::Interrupt;
 use crate::output::{create_folder, write_json, write_whole};
-use crate::report::{self, Figure, PageRun, Polyline, RunTrace};
-use crate::run_log::LogRow;
+use crate::report::{self, REPORT_FILE, SCENE_FILE, SceneFile};
 use crate::scenario::Scenario;
 use crate::summary::{ModelSummary, RunIdentity, Summary};
 
+const MAT_LOG: &str = "log.mat";
 const MODEL: &str = "model.json";
 const IDENTIFICATION_TEXT: &str = "identification.txt";
 const IDENTIFICATION_JSON: &str = "identification.json";
@@ -40,12 +38,10 @@ pub(super) struct Job<'a> {
 /// A run that was made.
 pub(super) struct RunResult {
     pub(super) summary: Summary,
-    rows: Vec<LogRow>,
-    figures: Vec<Figure>,
 }
 
 impl Job<'_> {
-    /// Runs, then writes summary and figures beside the log.
+    /// Runs, then writes the summary beside the log.
     pub(super) fn run(&self, interrupt: &Interrupt, bar: &ProgressBar) -> Result<RunResult> {
         let settings = self.scenario.controller(self.controller)?;
         let built = match (settings, self.recorded) {
@@ -78,6 +74,11 @@ impl Job<'_> {
         if let Some(identification) = &identification {
             write_identification(&self.out, identification)?;
         }
+        let described = SceneFile::new(self.scenario, self.vehicle, self.controller, self.seed)?;
+        write_whole(
+            &self.out.join(SCENE_FILE),
+            &(serde_json::to_string(&described)? + "\n"),
+        )?;
         let run = Run {
             scenario: self.scenario,
             vehicle: self.vehicle,
@@ -104,14 +105,10 @@ impl Job<'_> {
             self.scenario.sample_time_s,
         );
         write_json(&self.out.join("summary.json"), &summary)?;
-        let mut result = RunResult {
-            summary,
-            rows: finished.rows,
-            figures: Vec::new(),
-        };
-        result.figures = report::draw_all(&[result.trace()], &road_edges(self.scenario)?)?;
-        write_figures(&self.out, &result.figures)?;
-        Ok(result)
+        // MATLAB reads this one without an import script.
+        let columns = report::log::read(&log, &report::log::Renamed::new()).columns;
+        report::mat::write(&self.out.join(MAT_LOG), &columns)?;
+        Ok(RunResult { summary })
     }
 }
 
@@ -125,16 +122,14 @@ fn write_identification(folder: &Path, found: &Identification) -> Result<()> {
 /// Removes what an earlier run or campaign derived from its logs: beside fresh logs it would lie if
 /// this one is interrupted.
 pub(super) fn remove_old_results(folder: &Path) -> Result<()> {
-    let names = [
+    for name in [
         "summary.json",
-        "index.html",
+        SCENE_FILE,
+        MAT_LOG,
         MODEL,
         IDENTIFICATION_TEXT,
         IDENTIFICATION_JSON,
-    ]
-    .map(str::to_owned);
-    let figures = report::FIGURE_NAMES.map(|name| format!("{name}.svg"));
-    for name in names.iter().chain(&figures) {
+    ] {
         let old = folder.join(name);
         match std::fs::remove_file(&old) {
             Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
@@ -143,28 +138,7 @@ pub(super) fn remove_old_results(folder: &Path) -> Result<()> {
             _ => {}
         }
     }
-    Ok(())
-}
-
-impl RunResult {
-    pub(super) fn trace(&self) -> RunTrace<'_> {
-        RunTrace {
-            name: &self.summary.controller,
-            rows: &self.rows,
-            ended_early: matches!(self.summary.outcome, Outcome::RolledOver | Outcome::SpunOut),
-        }
-    }
-
-    pub(super) fn into_page(self, scenario: &Scenario) -> PageRun {
-        let settings = scenario.controllers.get(&self.summary.controller);
-        PageRun {
-            description: settings
-                .map_or_else(|| "The driver alone.".into(), |s| s.description.clone()),
-            folder: self.summary.controller.clone(),
-            summary: self.summary,
-            figures: self.figures,
-        }
-    }
+    report::remove_old(&folder.join(REPORT_FILE))
 }
 
 /// Makes the runs, `workers` at a time, in the order given.
@@ -214,26 +188,4 @@ pub(super) fn step_bar(scenario: &Scenario, name: &str) -> ProgressBar {
     ProgressBar::new(scenario.steps() as u64)
         .with_style(style)
         .with_prefix(name.to_owned())
-}
-
-/// The two edges of the road, a point every metre.
-pub(super) fn road_edges(scenario: &Scenario) -> Result<Vec<Polyline>> {
-    let course = Course::new(&scenario.course)?;
-    let half = 0.5 * course.width_m();
-    let mut edges = vec![Vec::new(), Vec::new()];
-    let mut station = 0.0;
-    while station <= course.total_length_m() {
-        let p = course.point(station);
-        let (sin, cos) = p.heading_rad.sin_cos();
-        edges[0].push((p.x_m - half * sin, p.y_m + half * cos));
-        edges[1].push((p.x_m + half * sin, p.y_m - half * cos));
-        station += 1.0;
-    }
-    Ok(edges)
-}
-
-pub(super) fn write_figures(folder: &Path, figures: &[Figure]) -> Result<()> {
-    figures
-        .iter()
-        .try_for_each(|f| write_whole(&folder.join(f.name).with_extension("svg"), &f.svg))
 }

@@ -13,16 +13,15 @@ use crate::closed_loop::Recorded;
 use crate::interrupt::Interrupt;
 use crate::output::{create_folder, print_json, print_line, write_json};
 use crate::record::{self, record};
-use crate::report::{self, Page, PageRun, RunTrace};
+use crate::report::{self, REPORT_FILE};
 use crate::scenario::{self, DRIVER, Scenario};
 use crate::summary::Summary;
 use crate::terrain;
-use job::{
-    Job, RunResult, cores, remove_old_results, road_edges, run_all, step_bar, write_figures,
-};
+use job::{Job, RunResult, cores, remove_old_results, run_all, step_bar};
 
 /// The main job's scenario and controllers.
 const PAPER_SCENARIO: &str = "sedan-s1";
+const PAPER_QUESTION: &str = "Does a controller that knows the vehicle only from a recorded drive keep it on its wheels where the driver alone rolls over? And how does control on a model identified from the same recording do?";
 const PAPER_CONTROLLERS: [&str; 6] = [
     DRIVER,
     "rd-deepc-1",
@@ -32,7 +31,7 @@ const PAPER_CONTROLLERS: [&str; 6] = [
     "lmpc-no-speed-effect",
 ];
 
-/// `paper`: every controller of the main job, a table and a page.
+/// `paper`: every controller of the main job, a table and a report.
 ///
 /// # Errors
 /// When a run cannot be made or a result cannot be written.
@@ -63,26 +62,19 @@ pub fn paper(args: &PaperArgs, interrupt: &Interrupt) -> Result<()> {
     );
     let runs = all_or_every_error(results)?;
 
-    let traces: Vec<RunTrace<'_>> = runs.iter().map(RunResult::trace).collect();
-    let comparison = report::draw_all(&traces, &road_edges(&scenario)?)?;
-    write_figures(&args.out, &comparison)?;
-    let summaries: Vec<Summary> = runs.iter().map(|r| r.summary.clone()).collect();
-    let pages: Vec<PageRun> = runs.into_iter().map(|r| r.into_page(&scenario)).collect();
-    let index = args.out.join("index.html");
-    let page = Page {
-        title: format!("Rollover prevention: {} on {}", vehicle.name, scenario.name),
-        description: &scenario.description,
-        seed: args.seed,
-        comparison: &comparison,
-        runs: &pages,
-    };
-    report::write_index(&index, &page)?;
+    let summaries: Vec<Summary> = runs.into_iter().map(|run| run.summary).collect();
+    let folders = PAPER_CONTROLLERS.map(|controller| args.out.join(controller));
+    let mut report = report::collect(&folders, &report::log::Renamed::new());
+    report.title = format!("Rollover prevention: {} on {}", vehicle.name, scenario.name);
+    report.asked = vec![PAPER_QUESTION.into()];
+    report.provenance.command = format!("rollover-app paper --seed {}", args.seed);
+    let written = report::write(&report, &args.out.join(REPORT_FILE))?;
     if args.json {
         print_json(&summaries)
     } else {
         print_line(&report::summary_table(&summaries))?;
         print_models(&summaries)?;
-        print_line(&format!("figures: {}", index.display()))
+        print_line(&format!("report: {}", written.page.display()))
     }
 }
 
@@ -132,6 +124,12 @@ pub fn single(args: &RunArgs, interrupt: &Interrupt) -> Result<()> {
     let bar = step_bar(&scenario, &args.controller);
     let result = job.run(interrupt, &bar)?;
     bar.finish_and_clear();
+    let mut report = report::collect(std::slice::from_ref(&job.out), &report::log::Renamed::new());
+    report.provenance.command = format!(
+        "rollover-app run {} --controller {} --seed {}",
+        args.scenario, args.controller, args.seed
+    );
+    let written = report::write(&report, &job.out.join(REPORT_FILE))?;
     if args.json {
         print_json(&result.summary)
     } else {
@@ -139,7 +137,11 @@ pub fn single(args: &RunArgs, interrupt: &Interrupt) -> Result<()> {
             &result.summary,
         )))?;
         print_models(std::slice::from_ref(&result.summary))?;
-        print_line(&format!("results: {}", job.out.display()))
+        print_line(&format!(
+            "results: {}\nreport: {}",
+            job.out.display(),
+            written.page.display()
+        ))
     }
 }
 

@@ -141,6 +141,8 @@ fn over_time(quantity: &Quantity, runs: &[&Trace], which: &str) -> Result<Figure
             style: run_colour(index).stroke_width(run_width(index)),
             points: points(run, quantity),
             cross: run.ended == Outcome::RolledOver,
+
+            dash: [0, 0],
         })
         .collect();
     series.extend(quantity.limits.iter().map(|&limit| Series {
@@ -148,8 +150,11 @@ fn over_time(quantity: &Quantity, runs: &[&Trace], which: &str) -> Result<Figure
         style: limit_style(),
         points: vec![(0.0, limit), (end, limit)],
         cross: false,
+
+        dash: [0, 0],
     }));
     let axes = Axes {
+        fields: Vec::new(),
         title: quantity.title,
         x_label: "time / s",
         y_label: quantity.unit,
@@ -219,6 +224,8 @@ fn one_curve(number: usize, group: &[&Curve]) -> Result<Figure> {
             style: run_colour(index).stroke_width(run_width(index)),
             points: curve.points.iter().map(|p| (p[0], p[1])).collect(),
             cross: false,
+
+            dash: [0, 0],
         })
         .collect();
     let title = group.first().map_or("", |curve| {
@@ -227,6 +234,7 @@ fn one_curve(number: usize, group: &[&Curve]) -> Result<Figure> {
     let (x, y) = group.first().map_or(("", ""), |curve| (&curve.x, &curve.y));
     let along = series.iter().flat_map(|s| &s.points).map(|p| p.0);
     let axes = Axes {
+        fields: Vec::new(),
         title,
         x_label: x,
         y_label: y,
@@ -248,6 +256,8 @@ fn top_view(group: &[&Curve], runs: &[&Trace]) -> Result<Figure> {
             style: limit_style(),
             points: curve.points.iter().map(|p| (p[0], p[1])).collect(),
             cross: false,
+
+            dash: [0, 0],
         })
         .collect();
     let x = padded(series.iter().flat_map(|s| &s.points).map(|p| p.0));
@@ -262,9 +272,12 @@ fn top_view(group: &[&Curve], runs: &[&Trace]) -> Result<Figure> {
                 .filter(|point| point.0 <= x.1 && point.1.abs() < 20.0)
                 .collect(),
             cross: run.ended == Outcome::RolledOver,
+
+            dash: [0, 0],
         }
     }));
     let axes = Axes {
+        fields: Vec::new(),
         title: "Lanes, path and way of the centre of gravity",
         x_label: "x / m",
         y_label: "y / m",

@@ -3,6 +3,7 @@
 use anyhow::{Result, anyhow};
 use plotters::coord::Shift;
 use plotters::coord::types::RangedCoordf64;
+use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 
 /// One line of a chart.
@@ -13,6 +14,8 @@ pub(crate) struct Series<'a> {
     pub(crate) points: Vec<(f64, f64)>,
     /// Whether a cross marks the last point: the run ended early.
     pub(crate) cross: bool,
+    /// Lengths of line and gap, px; 0 for a whole line.
+    pub(crate) dash: [u8; 2],
 }
 
 /// What the axes show.
@@ -22,6 +25,15 @@ pub(crate) struct Axes<'a> {
     pub(crate) y_label: &'a str,
     pub(crate) x: (f64, f64),
     pub(crate) y: (f64, f64),
+    /// Fields filled with grey under the lines.
+    pub(crate) fields: Vec<Field>,
+}
+
+/// A rectangle and its grey, 0 to 255.
+pub(crate) struct Field {
+    pub(crate) low: (f64, f64),
+    pub(crate) high: (f64, f64),
+    pub(crate) grey: u8,
 }
 
 /// Colour-blind safe hues (Okabe and Ito), dark enough on white.
@@ -104,6 +116,10 @@ fn draw(
         .bold_line_style(GRID)
         .light_line_style(TRANSPARENT)
         .draw()?;
+    chart.draw_series(axes.fields.iter().map(|field| {
+        let grey = RGBColor(field.grey, field.grey, field.grey);
+        Rectangle::new([field.low, field.high], grey.filled())
+    }))?;
     for line in series {
         draw_series(&mut chart, line)?;
     }
@@ -123,13 +139,30 @@ type Chart<'a, 'b> = ChartContext<'a, Backend<'b>, Cartesian2d<RangedCoordf64, R
 
 fn draw_series(chart: &mut Chart<'_, '_>, line: &Series<'_>) -> DrawResult {
     let style = line.style;
-    let drawn = chart.draw_series(LineSeries::new(line.points.iter().copied(), style))?;
-    if !line.name.is_empty() {
-        drawn
-            .label(line.name)
-            .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style.stroke_width(3)));
+    let mut named = line.name;
+    // A gap ends a stroke.
+    for stroke in line.points.split(|p| !(p.0.is_finite() && p.1.is_finite())) {
+        if stroke.is_empty() {
+            continue;
+        }
+        let points = stroke.iter().copied();
+        let drawn = if line.dash == [0, 0] {
+            chart.draw_series(LineSeries::new(points, style))?
+        } else {
+            let [on, off] = line.dash.map(i32::from);
+            chart.draw_series(DashedLineSeries::new(points, on, off, style))?
+        };
+        if !named.is_empty() {
+            // A dashed line is dashed in the legend, too; a whole one has a dash longer than that.
+            let dash = if line.dash == [0, 0] { (40, 1) } else { (7, 4) };
+            drawn.label(named).legend(move |(x, y)| {
+                let points = [(x, y), (x + 18, y)];
+                DashedPathElement::new(points, dash.0, dash.1, style.stroke_width(3))
+            });
+            named = "";
+        }
     }
-    if let Some(&end) = line.points.last().filter(|_| line.cross) {
+    if let Some(&end) = line.points.iter().rfind(|p| line.cross && p.1.is_finite()) {
         let mark = Cross::new(end, CROSS_SIZE, line.style.color.stroke_width(3));
         chart.draw_series(std::iter::once(mark))?;
     }

@@ -1,130 +1,259 @@
-//! The figures of a run, or of several runs over one another.
+//! The figures of a report as SVG, for a paper: one for every plot of the page.
 
 use anyhow::Result;
-use plotters::prelude::{Color, ShapeStyle};
+use plotters::prelude::{Color, RGBColor, ShapeStyle};
 
-use super::chart::{Axes, Series, limit_style, line_chart, run_colour, run_width};
-use crate::run_log::LogRow;
-use crate::summary::LTR_LIFT_OFF;
-
-/// A run as the figures need it.
-pub struct RunTrace<'a> {
-    /// Name in the legend.
-    pub name: &'a str,
-    /// The run's log.
-    pub rows: &'a [LogRow],
-    /// Whether it ended before its time, by a rollover or a spin.
-    pub ended_early: bool,
-}
+use super::chart::{Axes, Field, Series, limit_style, line_chart, run_width};
+use super::data::{Point, Report, Run, Scene, TerrainMap};
+use super::log::TIME;
+use super::pack::{Grid, Thinning};
+use super::plots::{Look, PLOTS, Plot, WHEEL_LOADS, drawn_first, looks};
 
 /// A drawn figure.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Figure {
-    /// File name without extension.
-    pub name: &'static str,
+    /// File name without extension: the scene's name and the plot's.
+    pub name: String,
     /// What it shows, in a sentence.
     pub caption: String,
     /// The drawing.
     pub svg: String,
 }
 
-/// The road's edges as a picture needs them, in metres.
-pub type Polyline = Vec<(f64, f64)>;
-
-/// File names, without extension, of all figures.
-pub const FIGURE_NAMES: [&str; 4] = [LTR, SPEED, STEERING_WHEEL, COURSE];
-const LTR: &str = "ltr";
-const SPEED: &str = "speed";
-const STEERING_WHEEL: &str = "steering-wheel";
-const COURSE: &str = "course";
+/// The part of a figure's file name that tells its plot.
+pub const FIGURE_ENDS: [&str; 12] = [
+    "ltr",
+    "speed",
+    "steering-wheel",
+    "steering-correction",
+    "roll",
+    "path-deviation",
+    "lateral-acceleration",
+    "yaw-rate",
+    "step-time",
+    "wheel-loads",
+    "road",
+    "terrain",
+];
 
 const WIDE: (u32, u32) = (920, 400);
-/// LTR beyond its limits, with room for the legend above.
-const LTR_AXIS: (f64, f64) = (-1.5, 2.1);
+/// Instants in a figure: two for each of its pixels.
+const INSTANTS: f64 = 1600.0;
+/// Fields of a terrain of which more would make the figure slow to draw.
+const MOST_FIELDS: usize = 6000;
+/// Colours and names of the wheel loads, in the order of their columns.
+const WHEELS: [(&str, RGBColor, [u8; 2]); 4] = [
+    ("front left", RGBColor(0, 95, 173), [0, 0]),
+    ("front right", RGBColor(213, 94, 0), [0, 0]),
+    ("rear left", RGBColor(0, 95, 173), [6, 4]),
+    ("rear right", RGBColor(213, 94, 0), [6, 4]),
+];
 
-/// Draws load transfer ratio, speed, steering wheel and the course from above.
+/// Draws every plot of every scene.
 ///
 /// # Errors
 /// When a figure cannot be drawn.
-pub fn draw_all(runs: &[RunTrace<'_>], road_edges: &[Polyline]) -> Result<Vec<Figure>> {
-    Ok(vec![
-        ltr(runs)?,
-        speed(runs)?,
-        steering_wheel(runs)?,
-        course(runs, road_edges)?,
-    ])
-}
-
-fn ltr(runs: &[RunTrace<'_>]) -> Result<Figure> {
-    let mut series = run_series(runs, |r| r.ltr);
-    series.extend(limits(runs, &[-LTR_LIFT_OFF, LTR_LIFT_OFF]));
-    Ok(Figure {
-        name: LTR,
-        caption: "Load transfer ratio. At ±1 the inner wheels carry nothing. A cross marks a run that ended early.".into(),
-        svg: time_chart(runs, "Load transfer ratio", "LTR", LTR_AXIS, &series)?,
-    })
-}
-
-fn speed(runs: &[RunTrace<'_>]) -> Result<Figure> {
-    let mut series = Vec::new();
-    for (index, run) in runs.iter().enumerate() {
-        let colour = run_colour(index);
-        let thin = colour.mix(0.45).stroke_width(1);
-        series.push(trace(
-            run,
-            run.name,
-            colour.stroke_width(run_width(index)),
-            |r| r.speed_kmh,
-        ));
-        series.push(trace(run, "", thin, |r| r.target_speed_kmh));
+pub fn figures(report: &Report) -> Result<Vec<Figure>> {
+    let mut all = Vec::new();
+    for scene in &report.scenes {
+        for plot in &PLOTS {
+            all.extend(time_plot(scene, plot)?);
+        }
+        all.extend(wheel_loads(scene)?);
+        all.extend(road(scene)?);
+        all.extend(profile(scene)?);
     }
-    let range = padded(&series, 2.0);
-    Ok(Figure {
-        name: SPEED,
-        caption: "Speed (thick) and the commanded target speed (thin).".into(),
-        svg: time_chart(runs, "Speed", "km/h", range, &series)?,
-    })
+    Ok(all)
 }
 
-fn steering_wheel(runs: &[RunTrace<'_>]) -> Result<Figure> {
-    let mut series = run_series(runs, |r| r.steering_wheel_deg);
-    for (index, run) in runs.iter().enumerate() {
-        let faint = run_colour(index).mix(0.45).stroke_width(1);
-        series.push(trace(run, "", faint, |r| r.steering_wheel_reference_deg));
+/// A name that every file system takes.
+pub(super) fn file_name(text: &str) -> String {
+    let plain = |c: char| {
+        if c.is_ascii_alphanumeric() || c == '-' {
+            c
+        } else {
+            '-'
+        }
+    };
+    let name: String = text.chars().take(80).map(plain).collect();
+    name.trim_matches('-').to_lowercase()
+}
+
+fn shown(scene: &Scene) -> impl Iterator<Item = (usize, &Run, Look)> {
+    let looks = looks(&scene.runs);
+    let drawn = drawn_first(&scene.runs);
+    let runs = scene.runs.iter().zip(looks).zip(drawn);
+    let runs = runs.filter(|(_, drawn)| *drawn).enumerate();
+    runs.map(|(index, ((run, look), _))| (index, run, look))
+}
+
+fn colour(look: Look) -> RGBColor {
+    let [r, g, b] = look.light;
+    RGBColor(r, g, b)
+}
+
+fn ended_early(run: &Run) -> bool {
+    use vehicle_dyn::metrics::Outcome;
+    matches!(run.outcome, Some(Outcome::RolledOver | Outcome::SpunOut))
+}
+
+/// A column of a run over time, with no more points than the figure shows.
+fn trace(run: &Run, column: &str) -> Option<Vec<(f64, f64)>> {
+    let (time, values) = (run.columns.get(TIME)?, run.columns.get(column)?);
+    let (&start, &end) = (time.first()?, time.last()?);
+    let step = (end - start) / INSTANTS;
+    if time.len() as f64 <= INSTANTS || step <= 0.0 {
+        return Some(time.iter().copied().zip(values.iter().copied()).collect());
     }
-    let range = padded(&series, 10.0);
-    Ok(Figure {
-        name: STEERING_WHEEL,
-        caption: "Steering wheel: what was applied (thick) and what the driver asked for (thin)."
-            .into(),
-        svg: time_chart(runs, "Steering wheel", "deg", range, &series)?,
-    })
+    let grid = Grid::over(start, end, step);
+    let sampled = grid.sample(time, values, Thinning::Peaks);
+    let instants = (0..grid.count).map(|k| (start + k as f64 * step).min(end));
+    let mut points: Vec<(f64, f64)> = instants.zip(sampled).collect();
+    // The grid's last instants lie behind the log.
+    while points.last().is_some_and(|p| !p.1.is_finite()) {
+        points.pop();
+    }
+    Some(points)
+}
+
+fn series(name: &str, style: ShapeStyle, points: Vec<(f64, f64)>) -> Series<'_> {
+    Series {
+        name,
+        style,
+        points,
+        cross: false,
+        dash: [0, 0],
+    }
+}
+
+fn time_plot(scene: &Scene, plot: &Plot) -> Result<Option<Figure>> {
+    let mut lines = Vec::new();
+    for (index, run, look) in shown(scene) {
+        if let Some(points) = trace(run, plot.column) {
+            let style = colour(look).stroke_width(run_width(index));
+            lines.push(Series {
+                cross: ended_early(run),
+                dash: look.dash,
+                ..series(&run.label, style, points)
+            });
+        }
+        if let Some(points) = plot.companion.and_then(|column| trace(run, column)) {
+            lines.push(series("", colour(look).mix(0.5).stroke_width(1), points));
+        }
+    }
+    if lines.is_empty() {
+        return Ok(None);
+    }
+    let x = extent(&lines, |p| p.0);
+    let (low, high) = extent(&lines, |p| p.1);
+    let [least, most] = plot.at_least.unwrap_or([low, high]);
+    let (low, high) = (low.min(least), high.max(most));
+    // Limits far outside would flatten what there is to see.
+    let reach = 0.6 * (high - low);
+    let near = |v: &f64| (low - reach..=high + reach).contains(v);
+    let limits: Vec<f64> = plot.limits.values(scene).into_iter().filter(near).collect();
+    let low = limits.iter().copied().fold(low, f64::min);
+    let high = limits.iter().copied().fold(high, f64::max);
+    for value in limits {
+        lines.push(series("", limit_style(), vec![(x.0, value), (x.1, value)]));
+    }
+    let margin = 0.06 * (high - low).max(1e-3);
+    // Room for the legend above the lines.
+    let legend = 0.08 * (high - low) * shown(scene).count() as f64;
+    let axes = Axes {
+        title: plot.title,
+        x_label: "time / s",
+        y_label: plot.axis,
+        x: (x.0, x.1.max(x.0 + 1e-3)),
+        y: (low - margin, high + margin + legend),
+        fields: Vec::new(),
+    };
+    figure(
+        scene,
+        plot.name,
+        plot.caption,
+        line_chart(WIDE, &axes, &lines)?,
+    )
+}
+
+#[expect(clippy::unnecessary_wraps, reason = "what the callers return")]
+fn figure(scene: &Scene, plot: &str, caption: &str, svg: String) -> Result<Option<Figure>> {
+    Ok(Some(Figure {
+        name: format!("{}-{plot}", file_name(&scene.name)),
+        caption: caption.into(),
+        svg,
+    }))
+}
+
+/// One figure per run: four lines are enough for one.
+fn wheel_loads(scene: &Scene) -> Result<Vec<Figure>> {
+    let mut drawn = Vec::new();
+    for (_, run, _) in shown(scene) {
+        let lines: Vec<Series<'_>> = WHEEL_LOADS
+            .iter()
+            .zip(WHEELS)
+            .filter_map(|(column, (name, colour, dash))| {
+                let points = trace(run, column)?.into_iter().map(|(t, n)| (t, n / 1e3));
+                Some(Series {
+                    dash,
+                    ..series(name, colour.stroke_width(2), points.collect())
+                })
+            })
+            .collect();
+        if lines.is_empty() {
+            continue;
+        }
+        let (x, y) = (extent(&lines, |p| p.0), extent(&lines, |p| p.1));
+        let title = format!("Wheel loads, {}", run.label);
+        let axes = Axes {
+            title: &title,
+            x_label: "time / s",
+            y_label: "kN",
+            x: (x.0, x.1.max(x.0 + 1e-3)),
+            y: (y.0.min(0.0), (1.35 * y.1).max(1.0)),
+            fields: Vec::new(),
+        };
+        drawn.push(Figure {
+            name: format!(
+                "{}-{}-wheel-loads",
+                file_name(&scene.name),
+                file_name(&run.label)
+            ),
+            caption: "Vertical tyre loads.".into(),
+            svg: line_chart(WIDE, &axes, &lines)?,
+        });
+    }
+    Ok(drawn)
 }
 
 /// Top view at one scale in both directions, so that a turn has its true shape.
-fn course(runs: &[RunTrace<'_>], road_edges: &[Polyline]) -> Result<Figure> {
-    let mut series: Vec<Series<'_>> = road_edges
-        .iter()
-        .map(|edge| Series {
-            name: "",
-            style: limit_style(),
-            points: edge.clone(),
-            cross: false,
-        })
-        .collect();
-    for (index, run) in runs.iter().enumerate() {
-        let points = run.rows.iter().map(|r| (r.x_m, r.y_m)).collect();
-        let style = run_colour(index).stroke_width(run_width(index));
-        series.push(Series {
-            name: run.name,
-            style,
-            points,
-            cross: run.ended_early,
+fn road(scene: &Scene) -> Result<Option<Figure>> {
+    let line = |points: &[Point]| points.iter().map(|p| (p[0], p[1])).collect::<Vec<_>>();
+    let mut lines = Vec::new();
+    if let Some(road) = &scene.road {
+        for edge in [&road.left, &road.right] {
+            lines.push(series("", limit_style(), line(edge)));
+        }
+    }
+    for (index, run, look) in shown(scene) {
+        let (Some(x), Some(y)) = (trace(run, "x_m"), trace(run, "y_m")) else {
+            continue;
+        };
+        let points = x.iter().zip(&y).map(|(x, y)| (x.1, y.1)).collect();
+        lines.push(Series {
+            cross: ended_early(run),
+            ..series(
+                &run.label,
+                colour(look).stroke_width(run_width(index)),
+                points,
+            )
         });
     }
-    let extent = |f: fn(&(f64, f64)) -> f64| range_of(series.iter().flat_map(|s| &s.points).map(f));
-    let (x, y) = (extent(|p| p.0), extent(|p| p.1));
+    if lines.iter().all(|l| l.points.is_empty()) {
+        return Ok(None);
+    }
     let margin = 25.0;
+    let (x, y) = (extent(&lines, |p| p.0), extent(&lines, |p| p.1));
     let (x, y) = ((x.0 - margin, x.1 + margin), (y.0 - margin, y.1 + margin));
     // The label areas and margins of the chart take these pixels away from the plot.
     let (frame_x, frame_y) = (92.0, 96.0);
@@ -137,92 +266,108 @@ fn course(runs: &[RunTrace<'_>], road_edges: &[Polyline]) -> Result<Figure> {
     )]
     let size = (WIDE.0, height as u32);
     let axes = Axes {
-        title: "Course from above",
+        title: "Road from above",
         x_label: "x / m",
         y_label: "y / m",
         x,
         y,
+        fields: scene
+            .terrain
+            .as_ref()
+            .map_or_else(Vec::new, |map| heights(map, x, y)),
     };
-    Ok(Figure {
-        name: COURSE,
-        caption: "The road's edges and where the vehicle went.".into(),
-        svg: line_chart(size, &axes, &series)?,
-    })
+    let caption = "The road's edges and where the vehicles went.";
+    figure(scene, "road", caption, line_chart(size, &axes, &lines)?)
 }
 
-fn run_series<'a>(runs: &[RunTrace<'a>], value: fn(&LogRow) -> f64) -> Vec<Series<'a>> {
-    runs.iter()
-        .enumerate()
-        .map(|(index, run)| {
-            trace(
-                run,
-                run.name,
-                run_colour(index).stroke_width(run_width(index)),
-                value,
-            )
-        })
-        .collect()
-}
-
-fn trace<'a>(
-    run: &RunTrace<'_>,
-    name: &'a str,
-    style: ShapeStyle,
-    value: fn(&LogRow) -> f64,
-) -> Series<'a> {
-    Series {
-        name,
-        style,
-        points: run.rows.iter().map(|r| (r.time_s, value(r))).collect(),
-        // The thin lines beside a run's own need no mark.
-        cross: run.ended_early && !name.is_empty(),
+/// Heights within a view as fields, dark where low; neighbours share one where there are too many.
+fn heights(map: &TerrainMap, x: (f64, f64), y: (f64, f64)) -> Vec<Field> {
+    let known = map.heights_m.iter().copied().filter(|h| h.is_finite());
+    let (low, high) = known.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| {
+        (low.min(h), high.max(h))
+    });
+    let span = (high - low).max(1e-9);
+    let mut stride = 1;
+    while (map.columns / stride) * (map.rows / stride) > MOST_FIELDS {
+        stride += 1;
     }
+    let size = stride as f64 * map.spacing_m;
+    let mut fields = Vec::new();
+    for row in (0..map.rows).step_by(stride) {
+        for column in (0..map.columns).step_by(stride) {
+            let height = map.heights_m.get(row * map.columns + column);
+            let Some(height) = height.filter(|h| h.is_finite()) else {
+                continue;
+            };
+            let left = map.x_min_m + (column as f64 - 0.5) * map.spacing_m;
+            let bottom = map.y_min_m + (row as f64 - 0.5) * map.spacing_m;
+            let low_corner = (left.max(x.0), bottom.max(y.0));
+            let high_corner = ((left + size).min(x.1), (bottom + size).min(y.1));
+            if low_corner.0 >= high_corner.0 || low_corner.1 >= high_corner.1 {
+                continue;
+            }
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "between 176 and 246"
+            )]
+            let grey = (176.0 + 70.0 * (height - low) / span) as u8;
+            fields.push(Field {
+                low: low_corner,
+                high: high_corner,
+                grey,
+            });
+        }
+    }
+    fields
 }
 
-fn limits(runs: &[RunTrace<'_>], values: &[f64]) -> Vec<Series<'static>> {
-    let end = duration(runs);
-    values
-        .iter()
-        .map(|&v| Series {
-            name: "",
-            style: limit_style(),
-            points: vec![(0.0, v), (end, v)],
-            cross: false,
-        })
-        .collect()
-}
-
-fn time_chart(
-    runs: &[RunTrace<'_>],
-    title: &str,
-    y_label: &str,
-    y: (f64, f64),
-    series: &[Series<'_>],
-) -> Result<String> {
-    let axes = Axes {
-        title,
-        x_label: "time / s",
-        y_label,
-        x: (0.0, duration(runs)),
-        y,
+fn profile(scene: &Scene) -> Result<Option<Figure>> {
+    let Some(profile) = &scene.profile else {
+        return Ok(None);
     };
-    line_chart(WIDE, &axes, series)
+    let line = |heights: &[f64]| -> Vec<(f64, f64)> {
+        let points = profile.station_m.iter().zip(heights);
+        points.map(|(s, h)| (*s, h * 1e3)).collect()
+    };
+    let (_, left, _) = WHEELS[0];
+    let (_, right, _) = WHEELS[1];
+    let lines = [
+        series(
+            "under the left wheels",
+            left.stroke_width(1),
+            line(&profile.left_m),
+        ),
+        series(
+            "under the right wheels",
+            right.stroke_width(1),
+            line(&profile.right_m),
+        ),
+    ];
+    if lines.iter().all(|l| l.points.is_empty()) {
+        return Ok(None);
+    }
+    let (x, y) = (extent(&lines, |p| p.0), extent(&lines, |p| p.1));
+    let axes = Axes {
+        title: "Height of the ground along the road",
+        x_label: "distance along the road / m",
+        y_label: "mm",
+        x,
+        y: (y.0 - 5.0, y.1 + 5.0 + 0.25 * (y.1 - y.0)),
+        fields: Vec::new(),
+    };
+    let caption = "Height under the wheels along the centre line.";
+    figure(scene, "terrain", caption, line_chart(WIDE, &axes, &lines)?)
 }
 
-fn duration(runs: &[RunTrace<'_>]) -> f64 {
-    runs.iter()
-        .filter_map(|run| run.rows.last())
-        .map(|r| r.time_s)
-        .fold(1e-3, f64::max)
-}
-
-fn padded(series: &[Series<'_>], padding: f64) -> (f64, f64) {
-    let (low, high) = range_of(series.iter().flat_map(|s| &s.points).map(|p| p.1));
-    (low - padding, high + padding)
-}
-
-fn range_of(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
+fn extent(lines: &[Series<'_>], f: fn(&(f64, f64)) -> f64) -> (f64, f64) {
+    let values = lines
+        .iter()
+        .flat_map(|s| &s.points)
+        .map(f)
+        .filter(|v| v.is_finite());
+    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
         (low.min(v), high.max(v))
-    })
+    });
+    if low <= high { (low, high) } else { (0.0, 1.0) }
 }

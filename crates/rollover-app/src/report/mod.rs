@@ -1,11 +1,35 @@
-//! Figures and pages drawn from run logs. Nothing here simulates or controls.
+//! The report: page, figures and tables from run logs. Nothing here simulates or controls.
+//!
+//! ```text
+//! logs ─→ log (what can be read) ─→ collect ─→ data::Report ─→ html, figures, tables
+//! ```
+//!
+//! A campaign adds claims and timing to the [`data::Report`] that [`collect()`] makes of its folder, and
+//! calls [`write()`].
 
 pub(crate) mod chart;
+mod collect;
+mod command;
+pub mod data;
 mod figures;
-mod page;
+mod html;
+pub mod log;
+pub mod mat;
+mod measures;
+mod output;
+mod pack;
+mod plots;
+mod scene_file;
 mod table;
+mod tables;
 
 pub(crate) use chart::{FONT, GRID, INK, tick};
-pub use figures::{FIGURE_NAMES, Figure, Polyline, RunTrace, draw_all};
-pub use page::{Page, PageRun, write_index};
+pub use collect::{LOG_FILE, collect, has_runs};
+pub use command::command;
+pub use figures::{FIGURE_ENDS, Figure, figures};
+pub use html::html;
+pub use measures::{outcome, run_figures, seed_rows};
+pub use output::{REPORT_FILE, Written, remove_old, write};
+pub use scene_file::{SCENE_FILE, SceneFile};
 pub use table::summary_table;
+pub use tables::{TABLE_NAMES, Table, tables};

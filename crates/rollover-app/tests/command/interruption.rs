@@ -99,7 +99,7 @@ fn a_campaign_that_is_stopped_leaves_no_page_and_no_empty_log() {
     let output = running.wait_with_output().expect("the command ends");
     assert_eq!(output.status.code(), Some(130));
     assert!(
-        !out.join("index.html").exists(),
+        !out.join("report.html").exists(),
         "no page about another seed's runs"
     );
     let after = std::fs::read(out.join("rd-deepc-1-paper/log.csv")).expect("the last run's log");

@@ -1,0 +1,106 @@
+//! The files of a report.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+
+use super::data::Report;
+use super::{FIGURE_ENDS, TABLE_NAMES, figures, html, tables};
+use crate::output::{create_folder, write_whole};
+
+/// The page's usual name.
+pub const REPORT_FILE: &str = "report.html";
+const FIGURES: &str = "figures";
+const TABLES: &str = "tables";
+
+/// What was written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Written {
+    /// The page.
+    pub page: PathBuf,
+    /// Its size, bytes.
+    pub page_bytes: usize,
+    /// Number of figures, beside the page in `figures/`.
+    pub figures: usize,
+    /// Number of tables, beside the page in `tables/`.
+    pub tables: usize,
+}
+
+/// Writes the page to a file, and figures and tables into folders beside it.
+///
+/// # Errors
+/// When a figure cannot be drawn or the folder cannot be written.
+pub fn write(report: &Report, page: &Path) -> Result<Written> {
+    let folder = folder_of(page);
+    let text = html(report)?;
+    let (figures, tables) = (figures(report)?, tables(report)?);
+    create_folder(folder)?;
+    remove_old(page)?;
+    if !figures.is_empty() {
+        create_folder(&folder.join(FIGURES))?;
+    }
+    for figure in &figures {
+        let file = folder.join(FIGURES).join(format!("{}.svg", figure.name));
+        write_whole(&file, &figure.svg)?;
+    }
+    if !tables.is_empty() {
+        create_folder(&folder.join(TABLES))?;
+    }
+    for table in &tables {
+        let file = folder.join(TABLES).join(format!("{}.csv", table.name));
+        write_whole(&file, &table.csv)?;
+    }
+    // The page last: while it is there, what belongs to it is there.
+    write_whole(page, &text)?;
+    Ok(Written {
+        page: page.to_path_buf(),
+        page_bytes: text.len(),
+        figures: figures.len(),
+        tables: tables.len(),
+    })
+}
+
+/// Removes an earlier report, its figures and tables: beside fresh logs they would lie. Other files
+/// stay.
+///
+/// # Errors
+/// When a file cannot be removed.
+pub fn remove_old(page: &Path) -> Result<()> {
+    let folder = folder_of(page);
+    remove(page)?;
+    for table in TABLE_NAMES {
+        remove(&folder.join(TABLES).join(format!("{table}.csv")))?;
+    }
+    let Ok(entries) = std::fs::read_dir(folder.join(FIGURES)) else {
+        return Ok(());
+    };
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        let ours = name.to_str().and_then(|name| name.strip_suffix(".svg"));
+        let ours = ours.is_some_and(|n| {
+            FIGURE_ENDS
+                .iter()
+                .any(|end| n.ends_with(&format!("-{end}")))
+        });
+        if ours {
+            remove(&entry.path())?;
+        }
+    }
+    Ok(())
+}
+
+fn folder_of(page: &Path) -> &Path {
+    match page.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}
+
+fn remove(file: &Path) -> Result<()> {
+    match std::fs::remove_file(file) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
+            Err(e).with_context(|| format!("cannot replace {}", file.display()))
+        }
+        _ => Ok(()),
+    }
+}
