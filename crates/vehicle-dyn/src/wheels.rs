@@ -192,8 +192,13 @@ impl Wheel {
         // Only across the wheel: the part along a steered wheel, `scrub * forward.y`, is left out.
         let lateral_speed = contact_velocity.dot(&left) + motion.scrub_m_s * left.y;
         let slip_speed = [tread_speed - speed, -lateral_speed];
-        let slide = (slip_speed[0] * slip_speed[0] + slip_speed[1] * slip_speed[1]).sqrt();
-        let transport = speed.abs().max(slide * SLIP_PER_LARGEST);
+        let slide_squared = slip_speed[0] * slip_speed[0] + slip_speed[1] * slip_speed[1];
+        // Rolling is the rule, and needs no root.
+        let transport = if speed * speed >= SLIP_PER_LARGEST * SLIP_PER_LARGEST * slide_squared {
+            speed.abs()
+        } else {
+            slide_squared.sqrt() * SLIP_PER_LARGEST
+        };
         let slip_rate = if load > 0.0 {
             [
                 (slip_speed[0] - transport * motion.slip[0]) * self.inverse_relaxation[0],

@@ -79,8 +79,13 @@ pub struct Ground {
 impl Ground {
     /// Unit normal of the ground plane, pointing up, in world axes.
     #[must_use]
+    #[inline]
     pub fn normal(&self) -> Vector3<f64> {
         let (gx, gy) = (self.gradient_x, self.gradient_y);
+        // Level ground is the rule, and needs no root.
+        if gx == 0.0 && gy == 0.0 {
+            return Vector3::z();
+        }
         let scale = 1.0 / (1.0 + gx * gx + gy * gy).sqrt();
         Vector3::new(-gx * scale, -gy * scale, scale)
     }
