@@ -11,19 +11,21 @@ pub struct Line {
     pub points: Vec<(f64, f64)>,
 }
 
-/// A panel: what its vertical axis shows, and its lines.
+/// A panel: what its vertical axis shows, its lines, and points marked by circles.
 pub struct Panel {
     pub axis: String,
     pub lines: Vec<Line>,
+    pub marks: Vec<(f64, f64)>,
 }
 
 const REFERENCE: RGBColor = RGBColor(45, 49, 54);
 /// Colour-blind safe (Okabe and Ito).
-const OURS: [RGBColor; 4] = [
+const OURS: [RGBColor; 5] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
     RGBColor(170, 68, 153),
+    RGBColor(230, 159, 0),
 ];
 const INK: RGBColor = RGBColor(45, 49, 54);
 const GRID: RGBColor = RGBColor(226, 229, 233);
@@ -134,6 +136,13 @@ fn draw(
                 .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
         }
     }
+    let circles = panel.marks.iter().map(|&(x, y)| {
+        let place = (across(x), y);
+        Circle::new(place, 5, INK.stroke_width(2))
+    });
+    chart
+        .draw_series(circles)
+        .map_err(|error| anyhow!("{error}"))?;
     if legend {
         chart
             .configure_series_labels()
