@@ -21,14 +21,20 @@ pub fn rows(vehicle: &VehicleParameters) -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// A steady turn at little lateral acceleration, of a vehicle that needs no drive for it.
-fn steady_turn(vehicle: &VehicleParameters) -> Result<Observation> {
-    const HANDWHEEL_DEG: f64 = 5.0;
+/// The vehicle without drag, rolling resistance and differential: a steady turn needs no drive, and the
+/// axles' slip angles alone make it understeer, as the derived gradient assumes.
+pub(super) fn free_rolling(vehicle: &VehicleParameters) -> VehicleParameters {
     let mut vehicle = vehicle.clone();
     vehicle.aerodynamics.drag_area_m2 = 0.0;
     vehicle.tyre.rolling_resistance_coefficient = 0.0;
     vehicle.powertrain.differential_coupling_nm_s_per_rad = 0.0;
-    let mut simulation = on_flat(&vehicle, FRICTION, SPEED_KMH / 3.6)?;
+    vehicle
+}
+
+/// A steady turn at little lateral acceleration.
+fn steady_turn(vehicle: &VehicleParameters) -> Result<Observation> {
+    const HANDWHEEL_DEG: f64 = 5.0;
+    let mut simulation = on_flat(&free_rolling(vehicle), FRICTION, SPEED_KMH / 3.6)?;
     for tick in 1..=100 {
         let angle = HANDWHEEL_DEG * 0.01 * f64::from(tick);
         simulation.step(Command::from_deg_kmh(angle, SPEED_KMH), 0.01)?;

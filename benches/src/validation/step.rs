@@ -6,7 +6,7 @@
 use anyhow::{Context, Result, anyhow};
 use serde::de::DeserializeOwned;
 use vehicle_dyn::driver::{Driver, DriverParameters};
-use vehicle_dyn::manoeuvre::{ManoeuvreFile, RunSettings, converges};
+use vehicle_dyn::manoeuvre::{ManoeuvreFile, RunConvergence, RunSettings, converges};
 use vehicle_dyn::metrics::{Outcome, OutcomeMonitor};
 use vehicle_dyn::parameters::VehicleParameters;
 use vehicle_dyn::road::{Course, CourseDescription};
@@ -221,17 +221,23 @@ pub fn largest_difference(one: &[(f64, f64)], other: &[(f64, f64)], until_s: f64
     )
 }
 
-/// A manoeuvre of a vehicle: its run with the largest change.
-///
-/// # Errors
-/// When the manoeuvre cannot be driven, or half the step changes which runs it has.
-pub fn manoeuvre_row(file: &ManoeuvreFile, vehicle: &VehicleParameters) -> Result<Row> {
-    let runs = converges(file, vehicle, RunSettings::default())
-        .with_context(|| format!("{} with {}", file.name, vehicle.name))?;
+/// A manoeuvre of a vehicle: its run with the largest change. What cannot be compared is NaN, which
+/// passes nothing, and the remark says why.
+#[must_use]
+pub fn manoeuvre_row(file: &ManoeuvreFile, vehicle: &VehicleParameters) -> Row {
+    match converges(file, vehicle, RunSettings::default()) {
+        Ok(runs) => of_runs(&file.name, &runs),
+        Err(error) => row(&file.name, f64::NAN).remarked(error.to_string()),
+    }
+}
+
+fn of_runs(name: &str, runs: &[RunConvergence]) -> Row {
     let worst = runs
         .iter()
-        .max_by(|a, b| a.ltr_difference.total_cmp(&b.ltr_difference))
-        .with_context(|| format!("{} has no runs", file.name))?;
+        .max_by(|a, b| a.ltr_difference.total_cmp(&b.ltr_difference));
+    let Some(worst) = worst else {
+        return row(name, f64::NAN).remarked("it has no runs");
+    };
     let before = runs
         .iter()
         .map(|run| run.ltr_difference_before_lift)
@@ -249,5 +255,5 @@ pub fn manoeuvre_row(file: &ManoeuvreFile, vehicle: &VehicleParameters) -> Resul
             worst.length_difference_s
         );
     }
-    Ok(row(&file.name, worst.ltr_difference).remarked(text))
+    row(name, worst.ltr_difference).remarked(text)
 }

@@ -47,7 +47,7 @@ impl DriverParameters {
     /// Field, least and largest value, and the same as text with the unit.
     pub(crate) const RANGES: [(&'static str, f64, f64, &'static str); 7] = [
         ("preview_time_s", 0.05, 10.0, "[0.05, 10] s"),
-        ("preview_gain_deg_per_m", 0.0, 1e3, "[0, 1e3] deg/m"),
+        ("preview_gain_deg_per_m", 0.0, 1e4, "[0, 1e4] deg/m"),
         ("error_rate_gain_deg_s_per_m", 0.0, 1e3, "[0, 1e3] deg s/m"),
         ("integral_gain_deg_per_m_s", 0.0, 1e3, "[0, 1e3] deg/(m s)"),
         ("lag_s", 0.0, 2.0, "[0, 2] s"),

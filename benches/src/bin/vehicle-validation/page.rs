@@ -58,9 +58,9 @@ const PARTS: [Part; 7] = [
         title: "Standard manoeuvres, and who lifts two wheels",
         text: "Every embedded vehicle on a road of friction 0.85. NHTSA's rollover tests \
             (`scenarios/manoeuvres`): the negative controls must keep their wheels below two inches in \
-            each, the laden vehicles must lift in one at least. ISO 4138 reads its gradient over \
-            0.1 g and more, where tyres are no longer linear; the derived figure holds at straight \
-            running.",
+            each, the laden vehicles must lift in one at least. The derived \
+            understeer gradient holds at straight running without drive, so ISO 4138 is read for it below \
+            0.1 g, of a vehicle without drag, rolling resistance and differential.",
     },
     Part {
         group: "step",

@@ -128,7 +128,7 @@ impl Job {
                 Done::Rows(under("step", drive.vehicle_name(), vec![drive.row()?]))
             }
             Self::ManoeuvreStep(vehicle, file) => {
-                let row = step::manoeuvre_row(file, vehicle)?;
+                let row = step::manoeuvre_row(file, vehicle);
                 Done::Rows(under("step", &vehicle.name, vec![row]))
             }
             Self::Figures(vehicles) => Done::Figures(theory_figures::of_laws(vehicles)?),
