@@ -75,6 +75,35 @@ fn bounds(values: impl Iterator<Item = f64>) -> (f64, f64) {
     }
 }
 
+/// The corner with the fewest points, so that the legend hides least.
+fn emptiest_corner(
+    points: &[(f64, f64)],
+    (left, right): (f64, f64),
+    (bottom, top): (f64, f64),
+) -> SeriesLabelPosition {
+    // Shares of the panel that a legend takes.
+    const WIDTH_SHARE: f64 = 0.25;
+    const HEIGHT_SHARE: f64 = 0.6;
+    let hidden = |at_right: bool, at_top: bool| {
+        let inside = |&&(x, y): &&(f64, f64)| {
+            let (across, up) = ((x - left) / (right - left), (y - bottom) / (top - bottom));
+            let across = if at_right { 1.0 - across } else { across };
+            let up = if at_top { 1.0 - up } else { up };
+            across < WIDTH_SHARE && up < HEIGHT_SHARE
+        };
+        points.iter().filter(inside).count()
+    };
+    [
+        (hidden(true, true), SeriesLabelPosition::UpperRight),
+        (hidden(false, true), SeriesLabelPosition::UpperLeft),
+        (hidden(true, false), SeriesLabelPosition::LowerRight),
+        (hidden(false, false), SeriesLabelPosition::LowerLeft),
+    ]
+    .into_iter()
+    .min_by_key(|corner| corner.0)
+    .map_or(SeriesLabelPosition::UpperRight, |corner| corner.1)
+}
+
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 fn draw(
@@ -89,6 +118,8 @@ fn draw(
     let all = || panel.lines.iter().flat_map(|line| line.points.iter());
     let (left, right) = bounds(all().map(|(x, _)| across(*x)));
     let (bottom, top) = bounds(all().map(|(_, y)| *y));
+    let drawn: Vec<(f64, f64)> = all().map(|&(x, y)| (across(x), y)).collect();
+    let corner = emptiest_corner(&drawn, (left, right), (bottom, top));
     let mut chart = ChartBuilder::on(area)
         .margin(8)
         .margin_right(18)
@@ -124,7 +155,7 @@ fn draw(
         let points = line.points.iter().map(|&(x, y)| (across(x), y));
         let points: Vec<_> = points.filter(|(_, y)| y.is_finite()).collect();
         let series = if line.reference {
-            chart.draw_series(DashedLineSeries::new(points, 5, 3, style))
+            chart.draw_series(DashedLineSeries::new(points, 9, 6, style))
         } else {
             chart.draw_series(LineSeries::new(points, style))
         };
@@ -146,7 +177,7 @@ fn draw(
     if legend {
         chart
             .configure_series_labels()
-            .position(SeriesLabelPosition::UpperRight)
+            .position(corner)
             .label_font((FONT, 12).into_font().color(&INK))
             .background_style(WHITE.mix(0.85))
             .border_style(GRID)

@@ -49,7 +49,7 @@ fn over_time(title: &str, pairs: &[&Pair]) -> Result<String> {
                     let time = pair.time_s();
                     let (theirs, ours) = of(pair);
                     // Enough for the width of the figure.
-                    let every = time.len().div_ceil(250);
+                    let every = time.len().div_ceil(150);
                     let line = |values: Vec<f64>, reference: bool| Line {
                         name: if reference {
                             "reference".to_owned()
