@@ -3,6 +3,8 @@
 //! A vehicle on two wheels is an inverted pendulum: it makes whatever differs larger. So rows tell when
 //! the first side lifted, and what the difference was up to then.
 
+use std::fmt::Write;
+
 use anyhow::{Context, Result, anyhow};
 use serde::de::DeserializeOwned;
 use vehicle_dyn::driver::{Driver, DriverParameters};
@@ -190,13 +192,13 @@ fn remark(largest: f64, time_s: f64, lift_s: Option<f64>, before: f64, length_s:
         }
     };
     if largest > LTR_TOLERANCE {
-        text += &format!("; largest at {time_s:.2} s");
+        let _ = write!(text, "; largest at {time_s:.2} s");
         if lift_s.is_some_and(|lift_s| time_s >= lift_s) {
-            text += &format!(": {TIPS}");
+            let _ = write!(text, ": {TIPS}");
         }
     }
     if length_s > 0.0 {
-        text += &format!("; the two runs end {length_s:.3} s apart");
+        let _ = write!(text, "; the two runs end {length_s:.3} s apart");
     }
     text
 }
@@ -247,10 +249,11 @@ fn of_runs(name: &str, runs: &[RunConvergence]) -> Row {
         worst.run, worst.time_s
     );
     if worst.ltr_difference > LTR_TOLERANCE && worst.ltr_difference_before_lift <= LTR_TOLERANCE {
-        text += &format!(": {TIPS}");
+        let _ = write!(text, ": {TIPS}");
     }
     if worst.length_difference_s > 0.0 {
-        text += &format!(
+        let _ = write!(
+            text,
             "; its two runs end {:.3} s apart",
             worst.length_difference_s
         );
