@@ -14,6 +14,18 @@ pub fn create_folder(path: &Path) -> Result<()> {
         .with_context(|| format!("cannot create the folder {}", path.display()))
 }
 
+/// Creates a folder and requires that files can be written into it, before long work.
+///
+/// # Errors
+/// It cannot be created or written into.
+pub fn create_writable_folder(path: &Path) -> Result<()> {
+    create_folder(path)?;
+    let probe = path.join(".writable.partial");
+    std::fs::write(&probe, "")
+        .and_then(|()| std::fs::remove_file(&probe))
+        .with_context(|| format!("cannot write into the folder {}", path.display()))
+}
+
 /// Writes beside the target first and renames, so that nothing ever leaves half a file.
 ///
 /// # Errors

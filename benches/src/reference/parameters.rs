@@ -82,6 +82,22 @@ impl ReferenceParameters {
             .with_context(|| format!("{} is no parameter set of the model", path.display()))
     }
 
+    /// Reads a `NAME.parameters.json` and converts it to a vehicle that passes every check.
+    ///
+    /// # Errors
+    /// As [`Self::read`], and when what the set converts to is no possible vehicle.
+    pub fn read_vehicle(path: &Path, name: &str) -> Result<VehicleParameters> {
+        let vehicle = Self::read(path)?.vehicle(name);
+        vehicle.check().with_context(|| {
+            format!(
+                "{} converts to no possible vehicle: fields below are those of the converted one, \
+                 computed by the rules in benches/src/reference/parameters.rs",
+                path.display()
+            )
+        })?;
+        Ok(vehicle)
+    }
+
     /// The vehicle with these parameters.
     #[must_use]
     pub fn vehicle(&self, name: &str) -> VehicleParameters {

@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use serde::Deserialize;
 
 /// What `summary.json` says of one run. Other keys are not needed.
@@ -15,7 +15,8 @@ pub struct RunSummary {
     pub name: String,
     /// Speed at the start, m/s.
     pub v0: f64,
-    /// Time up to which the reference holds, s; `None` is to the end.
+    /// Time up to which the reference holds, s; `None` is to the end, and so is NaN.
+    #[serde(default)]
     pub valid_until: Option<f64>,
 }
 
@@ -47,6 +48,27 @@ pub struct Sample {
     pub acc_cmd_mps2: f64,
 }
 
+impl Sample {
+    /// The first column without a finite number.
+    fn not_finite(&self) -> Option<(&'static str, f64)> {
+        [
+            ("t_s", self.t_s),
+            ("vx_mps", self.vx_mps),
+            ("vy_mps", self.vy_mps),
+            ("yawrate_radps", self.yawrate_radps),
+            ("delta_rad", self.delta_rad),
+            ("ax_mps2", self.ax_mps2),
+            ("ay_total_mps2", self.ay_total_mps2),
+            ("roll_rad", self.roll_rad),
+            ("pitch_rad", self.pitch_rad),
+            ("LTR", self.LTR),
+            ("acc_cmd_mps2", self.acc_cmd_mps2),
+        ]
+        .into_iter()
+        .find(|(_, value)| !value.is_finite())
+    }
+}
+
 /// One run of the reference with what holds of it.
 #[derive(Debug, Clone)]
 pub struct Trajectory {
@@ -65,7 +87,8 @@ impl Trajectory {
         let path = folder.join("summary.json");
         let text = std::fs::read_to_string(&path)
             .with_context(|| format!("cannot read {}", path.display()))?;
-        let runs: Vec<RunSummary> = serde_json::from_str(&text)
+        // Python writes NaN and Infinity, which JSON does not have.
+        let runs: Vec<RunSummary> = json5::from_str(&text)
             .with_context(|| format!("{} is no summary of runs", path.display()))?;
         let runs: Vec<_> = runs
             .into_iter()
@@ -81,16 +104,38 @@ impl Trajectory {
             .collect()
     }
 
-    fn read(folder: &Path, summary: RunSummary) -> Result<Self> {
+    fn read(folder: &Path, mut summary: RunSummary) -> Result<Self> {
+        summary.valid_until = summary.valid_until.filter(|end| end.is_finite());
         let file = format!("{}.csv", summary.name);
         let path: PathBuf = folder.join(&summary.vehicle).join(file);
+        ensure!(
+            summary.v0.is_finite() && summary.v0 >= 0.0,
+            "v0 of run {} in the summary is {}: must be a speed in m/s",
+            summary.name,
+            summary.v0
+        );
         let mut reader = csv::Reader::from_path(&path)
             .with_context(|| format!("cannot read {}", path.display()))?;
-        let mut samples = Vec::new();
-        for row in reader.deserialize() {
+        let mut samples: Vec<Sample> = Vec::new();
+        for (index, row) in reader.deserialize().enumerate() {
             let sample: Sample = row.with_context(|| format!("in {}", path.display()))?;
             if summary.valid_until.is_some_and(|end| sample.t_s >= end) {
                 break;
+            }
+            let line = index + 2;
+            if let Some((column, value)) = sample.not_finite() {
+                bail!(
+                    "in {}, line {line}: {column} is {value}; end the run before, by valid_until in summary.json",
+                    path.display()
+                );
+            }
+            if let Some(last) = samples.last().filter(|last| last.t_s >= sample.t_s) {
+                bail!(
+                    "in {}, line {line}: t_s is {} after {}; times must rise",
+                    path.display(),
+                    sample.t_s,
+                    last.t_s
+                );
             }
             samples.push(sample);
         }

@@ -11,18 +11,22 @@ use vehicle_dyn::units::GRAVITY_M_S2;
 
 use super::Row;
 
-const TICK_S: f64 = 0.01;
-const FRICTION: f64 = 0.85;
-const AT_REST: Command = Command {
+pub(super) const TICK_S: f64 = 0.01;
+pub(super) const FRICTION: f64 = 0.85;
+pub(super) const AT_REST: Command = Command {
     handwheel_rad: 0.0,
     longitudinal: LongitudinalDemand::Released,
 };
 
-fn on_flat(vehicle: &VehicleParameters, friction: f64, speed_m_s: f64) -> Result<Simulation> {
+pub(super) fn on_flat(
+    vehicle: &VehicleParameters,
+    friction: f64,
+    speed_m_s: f64,
+) -> Result<Simulation> {
     with_substep(vehicle, friction, speed_m_s, DEFAULT_SUBSTEP_S)
 }
 
-fn with_substep(
+pub(super) fn with_substep(
     vehicle: &VehicleParameters,
     friction: f64,
     speed_m_s: f64,
@@ -106,13 +110,16 @@ fn symmetry(vehicle: &VehicleParameters) -> Result<Row> {
 
 /// The vehicle with springs, bars and tyres so hard that nothing leans: what is left is geometry.
 fn rigid(vehicle: &VehicleParameters) -> VehicleParameters {
+    // The hardest a vehicle file may have.
+    const HARDEST_SPRING_N_PER_M: f64 = 1e7;
     let mut vehicle = vehicle.clone();
-    // As hard as the step of 1 ms allows for the lightest wheels.
+    // As hard as the step of 1 ms allows for the lighter wheels.
     let unsprung = vehicle
         .mass
         .unsprung_mass_front_each_kg
         .min(vehicle.mass.unsprung_mass_rear_each_kg);
-    let (spring, tyre) = (1.2e5 * unsprung, 2.5e5 * unsprung);
+    let spring = (1.2e5 * unsprung).min(HARDEST_SPRING_N_PER_M);
+    let tyre = (2.5e5 * unsprung).min(HARDEST_SPRING_N_PER_M);
     let suspension = &mut vehicle.suspension;
     suspension.spring_rate_front_n_per_m = spring;
     suspension.spring_rate_rear_n_per_m = spring;
@@ -184,8 +191,11 @@ fn lossless(vehicle: &VehicleParameters) -> VehicleParameters {
     vehicle
 }
 
-fn roll_decay(vehicle: &VehicleParameters) -> Result<Row> {
-    const DURATION_S: f64 = 10.0;
+/// Energy of a roll without dampers over time: pairs of time (s) and energy over that at the start.
+///
+/// # Errors
+/// When the simulation fails.
+pub fn roll_energy(vehicle: &VehicleParameters, duration_s: f64) -> Result<Vec<(f64, f64)>> {
     let vehicle = lossless(vehicle);
     let mut simulation = on_flat(&vehicle, 0.0, 0.0)?;
     let at_rest = simulation.energy().total_j();
@@ -201,16 +211,25 @@ fn roll_decay(vehicle: &VehicleParameters) -> Result<Row> {
     simulation.set_state(leaning)?;
     let swing = simulation.energy().total_j() - at_rest;
     ensure!(swing > 0.0, "the leaning vehicle stores no energy");
-    for _ in 0..1000 {
+    let mut energies = vec![(0.0, 1.0)];
+    while simulation.time_s() < duration_s - 0.5 * TICK_S {
         simulation.step(AT_REST, TICK_S)?;
+        let share = (simulation.energy().total_j() - at_rest) / swing;
+        energies.push((simulation.time_s(), share));
     }
-    let left = simulation.energy().total_j() - at_rest;
+    Ok(energies)
+}
+
+fn roll_decay(vehicle: &VehicleParameters) -> Result<Row> {
+    const DURATION_S: f64 = 10.0;
+    let energies = roll_energy(vehicle, DURATION_S)?;
+    let left = energies.last().map_or(f64::NAN, |last| last.1);
     Ok(Row::absolute(
         "energy of a roll without dampers lost in a second",
         "%",
         0.0,
         0.1,
-        100.0 * (swing - left) / swing / DURATION_S,
+        100.0 * (1.0 - left) / DURATION_S,
     ))
 }
 
@@ -238,7 +257,11 @@ fn flight(vehicle: &VehicleParameters) -> Result<Row> {
     ))
 }
 
-fn halved_step(vehicle: &VehicleParameters) -> Result<Row> {
+/// Largest change of LTR between two steps, swinging to 0.5 g.
+///
+/// # Errors
+/// When a simulation fails.
+pub fn change_of_ltr(vehicle: &VehicleParameters, steps_s: [f64; 2]) -> Result<f64> {
     let run = |substep: f64| -> Result<Vec<Observation>> {
         drive(
             with_substep(vehicle, FRICTION, 25.0, substep)?,
@@ -246,10 +269,14 @@ fn halved_step(vehicle: &VehicleParameters) -> Result<Row> {
             1.0,
         )
     };
-    let (whole, half) = (run(DEFAULT_SUBSTEP_S)?, run(0.5 * DEFAULT_SUBSTEP_S)?);
-    let difference = whole.iter().zip(&half).fold(0.0_f64, |largest, (a, b)| {
+    let (one, other) = (run(steps_s[0])?, run(steps_s[1])?);
+    Ok(one.iter().zip(&other).fold(0.0_f64, |largest, (a, b)| {
         largest.max((a.ltr - b.ltr).abs())
-    });
+    }))
+}
+
+fn halved_step(vehicle: &VehicleParameters) -> Result<Row> {
+    let difference = change_of_ltr(vehicle, [DEFAULT_SUBSTEP_S, 0.5 * DEFAULT_SUBSTEP_S])?;
     Ok(Row::absolute(
         "largest change of LTR with half the step, swinging to 0.5 g",
         "",

@@ -4,9 +4,12 @@
 //! hold it against theory. The program `vehicle-validation` writes them all into a report; tests
 //! require them one by one.
 
+pub mod derived;
+pub mod manoeuvres;
 pub mod mechanics;
 pub mod reference;
 pub mod response;
+pub mod step;
 pub mod tyre;
 
 use serde::Serialize;

@@ -19,13 +19,19 @@ use vehicle_dyn::paper_model::{PaperModel, PaperModelSettings};
 use vehicle_dyn::parameters::VehicleParameters;
 use vehicle_dyn::road::{Course, CourseDescription, Segment, TurnDirection};
 use vehicle_dyn::simulation::{Command, InitialPose, LongitudinalDemand, Simulation};
-use vehicle_dyn::terrain::{Ground, Terrain};
+use vehicle_dyn::terrain::{Ground, GroundDescription, Terrain};
 use vehicle_dyn::units::{DEGREE, KMH};
 
 const TICK_S: f64 = 0.01;
 const TICKS: u32 = 1200;
 const FRICTION: f64 = 0.85;
 const SEED: u64 = 20_240_607;
+const RIVERBED: &str = "
+    friction = 0.85
+    fade_in_m = 20.0
+    roughness = { class = \"c\", contact_length_m = 0.13, seed = 1 }
+    undulation = { height_rms_m = 0.05, shortest_m = 25.0, longest_m = 80.0, seed = 1 }
+";
 
 /// How the handwheel and the speed go over time.
 #[derive(Debug, Clone, Copy)]
@@ -63,15 +69,18 @@ enum World {
     Flat,
     /// 14 degrees of freedom on a plane that falls to the side.
     Banked,
+    /// 14 degrees of freedom on a rough and wavy riverbed.
+    Riverbed,
     /// The paper's model with the paper's choices.
     Paper,
     /// The paper's model with the choices closest to the vehicle.
     PaperMatched,
 }
 
-const WORLDS: [World; 4] = [
+const WORLDS: [World; 5] = [
     World::Flat,
     World::Banked,
+    World::Riverbed,
     World::Paper,
     World::PaperMatched,
 ];
@@ -93,6 +102,8 @@ impl Write for Hash {
 struct Run {
     vehicle: &'static str,
     parameters: VehicleParameters,
+    /// The ground of [`World::Riverbed`].
+    riverbed: Terrain,
     world: World,
     manoeuvre: Manoeuvre,
 }
@@ -121,6 +132,7 @@ impl Run {
                 };
                 self.drive(Terrain::Plane(plane), pose, &mut hash)?
             }
+            World::Riverbed => self.drive(self.riverbed.clone(), pose, &mut hash)?,
             World::Paper => self.turn(paper(PaperModelSettings::PAPER)?, &mut hash)?,
             World::PaperMatched => self.turn(paper(PaperModelSettings::MATCHED)?, &mut hash)?,
         };
@@ -224,7 +236,14 @@ fn road() -> CourseDescription {
     }
 }
 
+/// A riverbed along [`road`].
+fn riverbed() -> Result<Terrain, Failure> {
+    let ground: GroundDescription = toml::from_str(RIVERBED)?;
+    Ok(Terrain::build(&ground, &Course::new(&road())?)?)
+}
+
 fn runs() -> Result<Vec<Run>, Failure> {
+    let riverbed = riverbed()?;
     let mut runs = Vec::new();
     for vehicle in vehicle_dyn::vehicles::names() {
         let parameters = vehicle_dyn::vehicles::embedded(vehicle)?;
@@ -233,6 +252,7 @@ fn runs() -> Result<Vec<Run>, Failure> {
                 runs.push(Run {
                     vehicle,
                     parameters: parameters.clone(),
+                    riverbed: riverbed.clone(),
                     world,
                     manoeuvre,
                 });

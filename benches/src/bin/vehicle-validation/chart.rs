@@ -11,19 +11,21 @@ pub struct Line {
     pub points: Vec<(f64, f64)>,
 }
 
-/// A panel: what its vertical axis shows, and its lines.
+/// A panel: what its vertical axis shows, its lines, and points marked by circles.
 pub struct Panel {
     pub axis: String,
     pub lines: Vec<Line>,
+    pub marks: Vec<(f64, f64)>,
 }
 
 const REFERENCE: RGBColor = RGBColor(45, 49, 54);
 /// Colour-blind safe (Okabe and Ito).
-const OURS: [RGBColor; 4] = [
+const OURS: [RGBColor; 5] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
     RGBColor(170, 68, 153),
+    RGBColor(230, 159, 0),
 ];
 const INK: RGBColor = RGBColor(45, 49, 54);
 const GRID: RGBColor = RGBColor(226, 229, 233);
@@ -73,6 +75,35 @@ fn bounds(values: impl Iterator<Item = f64>) -> (f64, f64) {
     }
 }
 
+/// The corner with the fewest points, so that the legend hides least.
+fn emptiest_corner(
+    points: &[(f64, f64)],
+    (left, right): (f64, f64),
+    (bottom, top): (f64, f64),
+) -> SeriesLabelPosition {
+    // Shares of the panel that a legend takes.
+    const WIDTH_SHARE: f64 = 0.25;
+    const HEIGHT_SHARE: f64 = 0.6;
+    let hidden = |at_right: bool, at_top: bool| {
+        let inside = |&&(x, y): &&(f64, f64)| {
+            let (across, up) = ((x - left) / (right - left), (y - bottom) / (top - bottom));
+            let across = if at_right { 1.0 - across } else { across };
+            let up = if at_top { 1.0 - up } else { up };
+            across < WIDTH_SHARE && up < HEIGHT_SHARE
+        };
+        points.iter().filter(inside).count()
+    };
+    [
+        (hidden(true, true), SeriesLabelPosition::UpperRight),
+        (hidden(false, true), SeriesLabelPosition::UpperLeft),
+        (hidden(true, false), SeriesLabelPosition::LowerRight),
+        (hidden(false, false), SeriesLabelPosition::LowerLeft),
+    ]
+    .into_iter()
+    .min_by_key(|corner| corner.0)
+    .map_or(SeriesLabelPosition::UpperRight, |corner| corner.1)
+}
+
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 fn draw(
@@ -87,6 +118,8 @@ fn draw(
     let all = || panel.lines.iter().flat_map(|line| line.points.iter());
     let (left, right) = bounds(all().map(|(x, _)| across(*x)));
     let (bottom, top) = bounds(all().map(|(_, y)| *y));
+    let drawn: Vec<(f64, f64)> = all().map(|&(x, y)| (across(x), y)).collect();
+    let corner = emptiest_corner(&drawn, (left, right), (bottom, top));
     let mut chart = ChartBuilder::on(area)
         .margin(8)
         .margin_right(18)
@@ -122,7 +155,7 @@ fn draw(
         let points = line.points.iter().map(|&(x, y)| (across(x), y));
         let points: Vec<_> = points.filter(|(_, y)| y.is_finite()).collect();
         let series = if line.reference {
-            chart.draw_series(DashedLineSeries::new(points, 5, 3, style))
+            chart.draw_series(DashedLineSeries::new(points, 9, 6, style))
         } else {
             chart.draw_series(LineSeries::new(points, style))
         };
@@ -134,10 +167,17 @@ fn draw(
                 .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
         }
     }
+    let circles = panel.marks.iter().map(|&(x, y)| {
+        let place = (across(x), y);
+        Circle::new(place, 5, INK.stroke_width(2))
+    });
+    chart
+        .draw_series(circles)
+        .map_err(|error| anyhow!("{error}"))?;
     if legend {
         chart
             .configure_series_labels()
-            .position(SeriesLabelPosition::UpperRight)
+            .position(corner)
             .label_font((FONT, 12).into_font().color(&INK))
             .background_style(WHITE.mix(0.85))
             .border_style(GRID)

@@ -6,8 +6,9 @@ use benches::validation::response::frequency_response;
 
 use crate::chart::{Line, Panel, panels};
 
-/// A figure: the stem of its file, its caption and the SVG.
+/// A figure: the part of the report it belongs to, the stem of its file, its caption and the SVG.
 pub struct Figure {
+    pub group: &'static str,
     pub stem: String,
     pub caption: String,
     pub svg: String,
@@ -48,7 +49,7 @@ fn over_time(title: &str, pairs: &[&Pair]) -> Result<String> {
                     let time = pair.time_s();
                     let (theirs, ours) = of(pair);
                     // Enough for the width of the figure.
-                    let every = time.len().div_ceil(250);
+                    let every = time.len().div_ceil(150);
                     let line = |values: Vec<f64>, reference: bool| Line {
                         name: if reference {
                             "reference".to_owned()
@@ -61,6 +62,7 @@ fn over_time(title: &str, pairs: &[&Pair]) -> Result<String> {
                     [line(ours, false), line(theirs, true)]
                 })
                 .collect(),
+            marks: Vec::new(),
         })
         .collect();
     panels(title, "time, s", false, &panels_)
@@ -117,6 +119,7 @@ fn bode(pair: &Pair) -> Result<String> {
                     line("ours", false, &found),
                     line("reference", true, &reference),
                 ],
+                marks: Vec::new(),
             });
         }
     }
@@ -153,6 +156,7 @@ pub fn figures(vehicle: &str, pairs: &[Pair]) -> Result<Vec<Figure>> {
             continue;
         }
         figures.push(Figure {
+            group: "reference",
             stem: format!("vehicle-{vehicle}-{stem}"),
             caption: format!("{title}: {vehicle} (colours) and the reference (dashed)."),
             svg: over_time(title, &pairs)?,
@@ -160,6 +164,7 @@ pub fn figures(vehicle: &str, pairs: &[Pair]) -> Result<Vec<Figure>> {
     }
     for pair in named(&["chirp_"], 1) {
         figures.push(Figure {
+            group: "reference",
             stem: format!("vehicle-{vehicle}-frequency"),
             caption: "Frequency responses; the reference's LTR leads for the reason below.".into(),
             svg: bode(pair)?,

@@ -4,15 +4,19 @@
 mod chart;
 mod figures;
 mod page;
+mod theory;
+mod theory_figures;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, Result, bail, ensure};
 use benches::output;
 use benches::reference::parameters::ReferenceParameters;
 use benches::reference::trajectory::Trajectory;
 use benches::validation::reference::{pairs, rows};
-use benches::validation::{Row, mechanics, tyre, under};
+use benches::validation::{Row, under};
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
 use vehicle_dyn::parameters::VehicleParameters;
@@ -88,8 +92,7 @@ fn vehicles(arguments: &Arguments) -> Result<Vec<(String, VehicleParameters)>> {
         .into_iter()
         .map(|name| {
             let path = folder.join(format!("{name}.parameters.json"));
-            let vehicle = ReferenceParameters::read(&path)?.vehicle(&name);
-            vehicle.check()?;
+            let vehicle = ReferenceParameters::read_vehicle(&path, &name)?;
             Ok((name, vehicle))
         })
         .collect()
@@ -123,7 +126,7 @@ fn against_corrected(bar: &ProgressBar) -> Result<Vec<Row>> {
     let folder = repository().join("benches/reference/vehicle-corrected");
     let name = "bmw_320i";
     let path = folder.join(format!("{name}.parameters.json"));
-    let vehicle = ReferenceParameters::read(&path)?.vehicle(name);
+    let vehicle = ReferenceParameters::read_vehicle(&path, name)?;
     let pairs = pairs(&vehicle, Trajectory::read_all(&folder, name)?, || {
         bar.tick();
     })?;
@@ -131,38 +134,60 @@ fn against_corrected(bar: &ProgressBar) -> Result<Vec<Row>> {
     Ok(under("corrected", name, rows(&pairs)))
 }
 
+/// Exit status of a program stopped by Ctrl-C, as shells report it.
+const INTERRUPTED_STATUS: i32 = 130;
+
+/// Ctrl-C ends the work at the next run, and a second one at once: files are whole in any case.
+fn on_interrupt() -> Result<Arc<AtomicBool>> {
+    let interrupted = Arc::new(AtomicBool::new(false));
+    let raised = Arc::clone(&interrupted);
+    ctrlc::set_handler(move || {
+        if raised.swap(true, Ordering::Relaxed) {
+            std::process::exit(INTERRUPTED_STATUS);
+        }
+    })?;
+    Ok(interrupted)
+}
+
 fn main() -> Result<()> {
     let arguments = Arguments::parse();
+    let interrupted = on_interrupt()?;
     // Folders first: the work must not end at a folder that cannot be written.
     let images = arguments.docs.join("images");
     for folder in [&arguments.docs, &images, &arguments.out] {
-        output::create_folder(folder)?;
+        output::create_writable_folder(folder)?;
     }
-    let embedded = if arguments.reference_only {
+    let jobs = if arguments.reference_only {
         Vec::new()
     } else {
-        vehicle_dyn::vehicles::names()
+        theory::jobs(&repository().join("scenarios"))?
     };
-    let bar = ProgressBar::new(embedded.len() as u64 + 2);
+    let bar = ProgressBar::new(jobs.len() as u64 + 2);
     bar.set_style(ProgressStyle::with_template(
         "{elapsed_precise} {bar:30} {pos}/{len} {msg}",
     )?);
-    let (mut all, figures) = against_reference(&arguments, &bar)?;
+    let (mut all, mut figures) = against_reference(&arguments, &bar)?;
     all.extend(against_corrected(&bar)?);
-    for name in embedded {
-        bar.set_message(format!("{name}: theory"));
-        let vehicle = vehicle_dyn::vehicles::embedded(name)?;
-        all.extend(under("mechanics", name, mechanics::rows(&vehicle)?));
-        all.extend(under("tyre", name, tyre::rows(&vehicle)));
-        bar.inc(1);
+    let found = theory::work(&jobs, &bar, &|| !interrupted.load(Ordering::Relaxed));
+    if interrupted.load(Ordering::Relaxed) {
+        bar.abandon();
+        eprintln!("interrupted: no report was written, and an earlier one is still there");
+        std::process::exit(INTERRUPTED_STATUS);
     }
+    let found = found?;
+    all.extend(found.rows);
+    figures.extend(found.figures);
     bar.finish_and_clear();
     for figure in &figures {
         output::write_whole(&images.join(format!("{}.svg", figure.stem)), &figure.svg)?;
     }
-    let page = page::page(&all, &figures);
+    let page = page::page(&all, &found.tests, &figures);
     output::write_whole(&arguments.docs.join("vehicle-validation.md"), &page)?;
     output::write_json(&arguments.out.join("vehicle-validation.json"), &all)?;
+    if !found.tests.is_empty() {
+        let path = arguments.out.join("vehicle-rollover-tests.json");
+        output::write_json(&path, &found.tests)?;
+    }
     println!("{}", page::summary(&all));
     Ok(())
 }

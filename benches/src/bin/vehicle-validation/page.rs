@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use benches::validation::Row;
+use benches::validation::manoeuvres::RolloverTest;
 use comfy_table::Table;
 use comfy_table::presets::ASCII_MARKDOWN;
 
@@ -15,7 +16,7 @@ struct Part {
     text: &'static str,
 }
 
-const PARTS: [Part; 4] = [
+const PARTS: [Part; 7] = [
     Part {
         group: "reference",
         title: "Against an independent model",
@@ -42,9 +43,31 @@ const PARTS: [Part; 4] = [
             so that the effective height is that of the centre of gravity.",
     },
     Part {
+        group: "derived",
+        title: "Derived figures against the simulation",
+        text: "`rollover-app vehicles check` prints figures that follow from the parameters alone. Steady \
+            turns near 0.04 g and free swings of the simulation must have them.",
+    },
+    Part {
         group: "tyre",
         title: "The tyre law",
         text: "The paper's combined-slip Magic Formula, at a road friction of 0.85.",
+    },
+    Part {
+        group: "manoeuvres",
+        title: "Standard manoeuvres, and who lifts two wheels",
+        text: "Every embedded vehicle on a road of friction 0.85. NHTSA's rollover tests \
+            (`scenarios/manoeuvres`): the negative controls must keep their wheels below two inches in \
+            each, the laden vehicles must lift in one at least. The derived \
+            understeer gradient holds at straight running without drive, so ISO 4138 is read for it below \
+            0.1 g, of a vehicle without drag, rolling resistance and differential.",
+    },
+    Part {
+        group: "step",
+        title: "Half the step",
+        text: "Every scenario by the driver alone, on its course and on that of its recording, and every \
+            manoeuvre with every embedded vehicle, with the step of 1 ms and with half of it. LTR is \
+            compared at every tick of the whole run, after wheels have lifted and landed too.",
     },
 ];
 
@@ -79,23 +102,73 @@ fn number(value: f64) -> String {
     }
 }
 
+/// Parts whose rows tell what happened beside the number.
+const REMARKED: [&str; 2] = ["manoeuvres", "step"];
+
 fn table(rows: &[&Row]) -> Table {
+    let remarked = rows.iter().any(|row| REMARKED.contains(&row.group));
     let mut table = Table::new();
     table.load_style(ASCII_MARKDOWN);
-    table.set_header(["vehicle", "check", "target", "tolerance", "result", "pass"]);
+    let header = ["vehicle", "check", "target", "tolerance", "result", "pass"];
+    table.set_header(
+        header
+            .into_iter()
+            .chain(remarked.then_some("what happened")),
+    );
     for row in rows {
         let unit = |value: f64| {
             format!("{} {}", number(value), row.unit)
                 .trim_end()
                 .to_owned()
         };
-        table.add_row([
+        let cells = [
             row.vehicle.clone(),
             row.check.clone(),
             unit(row.target),
             row.tolerance_as.clone(),
             unit(row.result),
             if row.pass { "yes" } else { "**NO**" }.to_owned(),
+        ];
+        let remark = remarked.then(|| row.remark.clone());
+        // A bar would end the cell.
+        let cells = cells.into_iter().chain(remark);
+        table.add_row(cells.map(|cell| cell.replace('|', "\\|")));
+    }
+    table
+}
+
+/// What every vehicle did in the rollover tests.
+fn tests_table(tests: &[RolloverTest]) -> Table {
+    let mut table = Table::new();
+    table.load_style(ASCII_MARKDOWN);
+    table.set_header([
+        "vehicle",
+        "test",
+        "handwheel",
+        "two-wheel lift",
+        "from",
+        "rolls over",
+        "height of both wheels",
+        "largest LTR",
+        "largest roll",
+        "largest ay",
+    ]);
+    let answer = |yes: bool| if yes { "yes" } else { "no" }.to_owned();
+    let none = || "–".to_owned();
+    for test in tests {
+        table.add_row([
+            test.vehicle.clone(),
+            test.manoeuvre.clone(),
+            test.amplitude_deg
+                .map_or_else(none, |angle| format!("{angle:.0} deg")),
+            answer(test.two_wheel_lift),
+            test.lift_speed_mph
+                .map_or_else(none, |speed| format!("{speed} mph")),
+            answer(test.rolled_over),
+            format!("{:.1} mm", test.height_mm),
+            format!("{:.3}", test.ltr),
+            format!("{:.1} deg", test.roll_deg),
+            format!("{:.3} g", test.lateral_acceleration_g),
         ]);
     }
     table
@@ -132,7 +205,7 @@ pub fn summary(rows: &[Row]) -> String {
 }
 
 /// The whole page.
-pub fn page(rows: &[Row], figures: &[Figure]) -> String {
+pub fn page(rows: &[Row], tests: &[RolloverTest], figures: &[Figure]) -> String {
     let mut page = String::from(
         "# How the vehicle model was validated\n\n\
          Written by `cargo run --release -p benches --bin vehicle-validation`; do not edit. \
@@ -153,23 +226,25 @@ pub fn page(rows: &[Row], figures: &[Figure]) -> String {
             part.text,
             table(&of_part)
         );
+        if part.group == "manoeuvres" {
+            let _ = write!(page, "\n{}\n", tests_table(tests));
+        }
         let mut remarks: Vec<&str> = of_part
             .iter()
             .filter(|row| !row.pass && !row.remark.is_empty())
+            .filter(|row| !REMARKED.contains(&row.group))
             .map(|row| row.remark.as_str())
             .collect();
         remarks.dedup();
         for remark in remarks {
             let _ = write!(page, "\nNot met: {remark}\n");
         }
-        if part.group == "reference" {
-            for figure in figures {
-                let _ = write!(
-                    page,
-                    "\n![{}](images/{}.svg)\n",
-                    figure.caption, figure.stem
-                );
-            }
+        for figure in figures.iter().filter(|figure| figure.group == part.group) {
+            let _ = write!(
+                page,
+                "\n![{}](images/{}.svg)\n\n{}\n",
+                figure.caption, figure.stem, figure.caption
+            );
         }
     }
     let _ = write!(page, "\n{NOT_VALIDATED}");
