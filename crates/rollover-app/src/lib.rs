@@ -23,6 +23,7 @@ pub mod run_log;
 pub mod scenario;
 pub mod summary;
 pub mod terrain;
+pub mod timing;
 pub mod vehicles_command;
 
 use anyhow::Result;
