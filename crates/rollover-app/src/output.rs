@@ -117,13 +117,28 @@ pub fn table_text(header: &[&str], rows: &[Vec<String>], right: &[usize]) -> Str
             column.set_cell_alignment(CellAlignment::Right);
         }
     }
-    let text = table.to_string();
+    fitted(table.to_string(), header, rows)
+}
+
+/// A table that was drawn already, or its rows as paragraphs where the terminal is too narrow.
+#[must_use]
+pub fn fitted(text: String, header: &[&str], rows: &[Vec<String>]) -> String {
     match terminal_width() {
         Some(width) if text.lines().any(|line| line.chars().count() > width) => {
             paragraphs(header, rows, width)
         }
         _ => text,
     }
+}
+
+/// Lines of words, broken where a terminal is too narrow for them.
+#[must_use]
+pub fn fitted_words(text: &str) -> String {
+    let Some(width) = terminal_width() else {
+        return text.to_owned();
+    };
+    let lines: String = text.lines().map(|line| wrapped(line, width, "")).collect();
+    lines.trim_end().to_owned()
 }
 
 /// Width of the terminal that standard output is, if it is one.

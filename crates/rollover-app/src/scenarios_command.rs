@@ -7,7 +7,7 @@ use serde::Serialize;
 use vehicle_dyn::manoeuvre;
 
 use crate::cli::{ScenariosAction, ScenariosArgs};
-use crate::output::{print_json, print_text, table_text};
+use crate::output::{fitted_words, print_json, print_text, table_text};
 use crate::scenario::{self, Scenario};
 use crate::toml_place::suggested;
 
@@ -88,9 +88,13 @@ fn list(args: &ScenariosArgs) -> Result<()> {
             .collect::<Vec<_>>()
     };
     print_text(&format!(
-        "{}\n\n{}\n\nDrive them with `run` and `manoeuvre`. `scenarios show NAME` prints a file to start one of your own from.\n",
+        "{}\n\n{}\n\n{}\n",
         table_text(&["scenario", "description"], &rows(Kind::Scenario), &[]),
         table_text(&["manoeuvre", "description"], &rows(Kind::Manoeuvre), &[]),
+        fitted_words(
+            "Drive them with `run` and `manoeuvre`. `scenarios show NAME` prints a file to start one \
+             of your own from."
+        ),
     ))
 }
 
@@ -127,7 +131,7 @@ fn check(args: &ScenariosArgs, name_or_path: &str) -> Result<()> {
     } else if is_file || scenario::embedded_text(name_or_path).is_some() {
         let scenario = scenario::load(name_or_path)?;
         // What a run would need beside the file.
-        let vehicle = vehicle_dyn::vehicles::find(&scenario.vehicle)?;
+        let vehicle = crate::vehicles_command::load(&scenario.vehicle)?;
         scenario.driver_of(&vehicle)?;
         Listed::scenario(&scenario)
     } else {
@@ -149,7 +153,8 @@ fn check(args: &ScenariosArgs, name_or_path: &str) -> Result<()> {
             listed.standard.unwrap_or_default()
         ),
     };
-    print_text(&format!("{name_or_path}: every value is allowed\n{what}\n"))
+    let words = format!("{name_or_path}: every value is allowed\n{what}");
+    print_text(&(fitted_words(&words) + "\n"))
 }
 
 /// Manoeuvre files have a table of that name.

@@ -66,6 +66,30 @@ impl Place {
         }
         Self::of_span(text, &found?)
     }
+
+    /// The place of a key of this name, wherever it stands.
+    #[must_use]
+    pub fn of_key(text: &str, name: &str) -> Option<Self> {
+        let document = DeTable::parse(text).ok()?;
+        Self::of_span(text, &key_within(document.get_ref(), name)?)
+    }
+}
+
+/// The first key of this name in a table or the tables within it.
+fn key_within(table: &DeTable<'_>, name: &str) -> Option<Range<usize>> {
+    table.iter().find_map(|(key, value)| {
+        if key.get_ref() == name {
+            return Some(key.span());
+        }
+        match value.get_ref() {
+            DeValue::Table(inner) => key_within(inner, name),
+            DeValue::Array(entries) => entries
+                .iter()
+                .filter_map(|entry| entry.get_ref().as_table())
+                .find_map(|inner| key_within(inner, name)),
+            _ => None,
+        }
+    })
 }
 
 /// The entry that a dotted path begins with. Names may hold dots themselves: the longest wins.
@@ -100,6 +124,13 @@ impl fmt::Display for Place {
         let indent = " ".repeat(self.column - 1);
         write!(f, "{margin} | {indent}{}", "^".repeat(self.length))
     }
+}
+
+/// The key that serde's message says is unknown.
+#[must_use]
+pub fn unknown_key(message: &str) -> Option<&str> {
+    let (_, rest) = message.split_once("unknown field `")?;
+    rest.split('`').next()
 }
 
 /// "did you mean `x`?" for serde's messages about unknown fields and variants, else nothing.
@@ -158,6 +189,8 @@ mod tests {
         assert_eq!(at("a.list"), Some((3, 1, "list = [1, 22, 3]".into())));
         assert_eq!(at("a.list[7]"), Some((3, 1, "list = [1, 22, 3]".into())));
         assert_eq!(at("none"), None);
+        let place = Place::of_key(TEXT, "y").map(|place| (place.line, place.column));
+        assert_eq!(place, Some((5, 7)));
     }
 
     #[test]

@@ -1,12 +1,14 @@
 //! `vehicles`: lists the built-in vehicles, checks a file, shows a file to start from.
 
-use anyhow::{Context, Result};
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
 use serde::Serialize;
 use vehicle_dyn::parameters::{Figure, VehicleParameters, schema};
 use vehicle_dyn::vehicles;
 
 use crate::cli::{VehiclesAction, VehiclesArgs};
-use crate::output::{print_json, print_text, table_text};
+use crate::output::{fitted_words, print_json, print_text, table_text};
 use crate::toml_place::suggested;
 
 /// `vehicles` and what stands behind it.
@@ -20,6 +22,23 @@ pub fn vehicles(args: &VehiclesArgs) -> Result<()> {
         Some(VehiclesAction::Show { name }) => show(name),
         Some(VehiclesAction::Schema) => print_text(&schema::schema_text()),
     }
+}
+
+/// A vehicle by name or file.
+///
+/// # Errors
+/// When it cannot be read or is refused; a misspelt name is answered with the one that is meant.
+pub fn load(name_or_path: &str) -> Result<VehicleParameters> {
+    let path = Path::new(name_or_path);
+    let is_name = path.extension().is_none() && !path.exists();
+    if is_name && vehicles::embedded_text(name_or_path).is_none() {
+        bail!(
+            "there is no vehicle `{name_or_path}`{}; give the path of a vehicle file or one of: {}",
+            suggested(name_or_path, vehicles::names()),
+            vehicles::names().join(", ")
+        );
+    }
+    Ok(vehicles::find(name_or_path)?)
 }
 
 /// A line of the list.
@@ -78,16 +97,16 @@ fn list(args: &VehiclesArgs) -> Result<()> {
         ]
     };
     let rows: Vec<_> = rows.into_iter().map(cells).collect();
-    print_text(&format!(
-        "{}\n\
-         SSF: static stability factor, half the track over the height of the centre of gravity.\n\
+    let words = format!(
+        "SSF: static stability factor, half the track over the height of the centre of gravity.\n\
          lift-off: lateral acceleration at which the second inner wheel leaves the ground in a slowly \
          tightening turn, from the parameters; the body rolls, the tyres give way.\n\
          grip: what the outer wheels hold then on a road of friction {}. With less grip than lift-off \
-         a vehicle slides in a steady turn, but a quick manoeuvre may still lift it.\n",
-        table_text(&header, &rows, &[1, 2, 3, 4, 5]),
+         a vehicle slides in a steady turn, but a quick manoeuvre may still lift it.",
         args.friction
-    ))
+    );
+    let table = table_text(&header, &rows, &[1, 2, 3, 4, 5]);
+    print_text(&format!("{table}\n{}\n", fitted_words(&words)))
 }
 
 /// The report on one vehicle.
@@ -107,7 +126,7 @@ struct CheckedFigure {
 }
 
 fn check(args: &VehiclesArgs, name_or_path: &str) -> Result<()> {
-    let vehicle = vehicles::find(name_or_path)?;
+    let vehicle = load(name_or_path)?;
     let figures = vehicle.figures(args.friction);
     if args.json {
         return print_json(&Checked {

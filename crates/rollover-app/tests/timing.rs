@@ -189,6 +189,8 @@ fn check(table: &TimingTable, rows: usize, columns: [usize; 2], moments: usize) 
     let written = agreement.as_written.as_ref().expect("both were solved");
     assert_eq!(written.moments, moments);
     assert!(written.objective_relative < 1e-6, "{written:?}");
+    assert!(written.steering_wheel_max_deg < 1e-6, "{written:?}");
+    assert!(written.target_speed_max_kmh < 1e-6, "{written:?}");
     assert_eq!(table.moments_s.len(), moments);
 }
 
@@ -269,9 +271,9 @@ fn refused(case: &Case, timing: &Timing<'_>) {
     assert!(error.downcast_ref::<Interrupted>().is_some(), "{error:#}");
 }
 
-/// The paper's size. Half a minute, and on a loaded machine more: run it with `--ignored`.
+/// The paper's size. A minute, and on a loaded machine two: run it with `--ignored`.
 #[test]
-#[ignore = "half a minute of solving at the paper's size"]
+#[ignore = "a minute of solving at the paper's size"]
 fn the_papers_size() {
     let case = Case::new(100);
     let recorded = Recorded::new(&case.data);

@@ -23,7 +23,7 @@ use crate::cli::ManoeuvreArgs;
 use crate::interrupt::Interrupt;
 use crate::output::{print_json, print_line};
 use crate::progress;
-use crate::toml_place::{Place, meant};
+use crate::toml_place::{Place, meant, unknown_key};
 
 pub use log::ManoeuvreLogRow;
 
@@ -40,7 +40,7 @@ pub fn help() -> String {
 /// program. A failed manoeuvre is none.
 pub fn manoeuvre(args: &ManoeuvreArgs, interrupt: &Interrupt) -> Result<()> {
     let file = load(&args.manoeuvre)?;
-    let vehicle = vehicle_dyn::vehicles::find(&args.vehicle)?;
+    let vehicle = crate::vehicles_command::load(&args.vehicle)?;
     let out = args
         .out
         .clone()
@@ -62,22 +62,31 @@ pub fn manoeuvre(args: &ManoeuvreArgs, interrupt: &Interrupt) -> Result<()> {
 /// # Errors
 /// There is no such manoeuvre, or it cannot be used.
 pub fn load(name_or_path: &str) -> Result<ManoeuvreFile> {
-    find(name_or_path).map_err(|error| match &error {
-        ManoeuvreError::OutOfRange { field, .. } => {
-            // Built-in files hold no such error.
-            let place = std::fs::read_to_string(name_or_path)
-                .ok()
-                .and_then(|text| Place::of_field(&text, field));
-            match place {
-                Some(place) => anyhow!("{name_or_path}: {error}\n{place}"),
-                None => anyhow!("{name_or_path}: {error}"),
+    find(name_or_path).map_err(|error| {
+        // Built-in files hold no such errors.
+        let text = std::fs::read_to_string(name_or_path).unwrap_or_default();
+        match &error {
+            ManoeuvreError::OutOfRange { field, .. } => {
+                let place = Place::of_field(&text, field);
+                let place = place.map_or_else(String::new, |place| format!("\n{place}"));
+                anyhow!("{name_or_path}: {error}{place}")
             }
+            // The parser knows only the table in which an unknown key stands.
+            ManoeuvreError::Malformed { message, .. } => {
+                let said = message.lines().last().unwrap_or_default();
+                match (meant(said), unknown_key(said)) {
+                    (Some(meant), Some(key)) => match Place::of_key(&text, key) {
+                        Some(place) => {
+                            anyhow!("{name_or_path} is not a manoeuvre: {said}; {meant}\n{place}")
+                        }
+                        None => anyhow!("{error}; {meant}"),
+                    },
+                    (Some(meant), None) => anyhow!("{error}; {meant}"),
+                    (None, _) => error.into(),
+                }
+            }
+            _ => error.into(),
         }
-        ManoeuvreError::Malformed { message, .. } => match meant(message) {
-            Some(meant) => anyhow!("{error}; {meant}"),
-            None => error.into(),
-        },
-        _ => error.into(),
     })
 }
 

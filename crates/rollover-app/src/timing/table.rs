@@ -3,7 +3,6 @@
 use std::fmt;
 
 use anyhow::Result;
-use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 use deepc_core::predictor::Predictor;
 use deepc_core::program::DeepcSettings;
 use sysid::Progress;
@@ -16,6 +15,7 @@ use super::{
     Follow, LoggedRun, TimedForm, TimedMethod, Timing, TimingError, TimingRow, TimingTable,
 };
 use crate::closed_loop::{self, Watch, deepc_problem};
+use crate::output::table_text;
 use crate::scenario::{DataMatrix, Prediction};
 
 /// Times every form of every method, one after the other on this thread.
@@ -287,26 +287,22 @@ fn least(times: &[f64]) -> f64 {
 impl fmt::Display for TimingTable {
     /// The table for a terminal, and a sentence on `DeePC` and RD-DeePC.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut table = Table::new();
-        table
-            .load_style(presets::UTF8_HORIZONTAL_ONLY)
-            .set_content_arrangement(ContentArrangement::Disabled)
-            .set_header([
-                "method",
-                "form",
-                "matrix",
-                "steps",
-                "cost",
-                "paper",
-                "time of a step",
-                "paper",
-                "÷ RD-DeePC as written",
-                "paper",
-            ]);
+        let header = [
+            "method",
+            "form",
+            "matrix",
+            "steps",
+            "cost",
+            "paper",
+            "time of a step",
+            "paper",
+            "÷ RD-DeePC as written",
+            "paper",
+        ];
         let or_dash = |text: Option<String>| text.unwrap_or_else(|| "–".into());
-        for row in &self.rows {
+        let cells = |row: &TimingRow| {
             let matrix = row.rows.zip(row.columns);
-            table.add_row([
+            vec![
                 row.method.to_string(),
                 row.form.to_string(),
                 or_dash(matrix.map(|(rows, columns)| format!("{rows}×{columns}"))),
@@ -315,17 +311,13 @@ impl fmt::Display for TimingTable {
                 or_dash(row.paper_cost.map(|cost| cost.to_string())),
                 seconds(row.step_s_median),
                 or_dash(row.paper_time_s.map(seconds)),
-                format!("{:.2e}", row.time_to_rd_deepc),
-                or_dash(
-                    row.paper_time_to_rd_deepc
-                        .map(|ratio| format!("{ratio:.2e}")),
-                ),
-            ]);
-        }
-        for column in table.column_iter_mut().skip(2) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-        writeln!(f, "{table}")?;
+                ratio(row.time_to_rd_deepc),
+                or_dash(row.paper_time_to_rd_deepc.map(ratio)),
+            ]
+        };
+        let rows: Vec<_> = self.rows.iter().map(cells).collect();
+        let right: Vec<usize> = (2..header.len()).collect();
+        writeln!(f, "{}", table_text(&header, &rows, &right))?;
         write!(f, "{}", self.deepc_equals_rd_deepc)
     }
 }
@@ -336,5 +328,13 @@ fn seconds(time: f64) -> String {
         long if long >= 1.0 => format!("{long:.2} s"),
         short if short >= 1e-3 => format!("{:.3} ms", short * 1e3),
         _ => format!("{:.1} µs", time * 1e6),
+    }
+}
+
+fn ratio(ratio: f64) -> String {
+    if ratio >= 0.01 {
+        format!("{ratio:.3}")
+    } else {
+        format!("{ratio:.1e}")
     }
 }
