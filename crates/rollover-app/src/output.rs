@@ -153,14 +153,15 @@ fn paragraphs(header: &[&str], rows: &[Vec<String>], width: usize) -> String {
         if let Some((_, name)) = cells.next() {
             text += &wrapped(name, width, "");
         }
-        for (title, cell) in cells.filter(|(_, cell)| !cell.is_empty()) {
-            let label = if title.is_empty() {
-                cell.clone()
-            } else {
-                format!("{title}: {cell}")
-            };
-            text += &wrapped(&label, width, "  ");
-        }
+        let labelled = |(title, cell): (&&str, &String)| match *title {
+            "" => cell.clone(),
+            title => format!("{title}: {cell}"),
+        };
+        let rest: Vec<String> = cells
+            .filter(|(_, cell)| !cell.is_empty())
+            .map(labelled)
+            .collect();
+        text += &wrapped(&rest.join("; "), width, "  ");
     }
     text.truncate(text.trim_end().len());
     text
@@ -193,7 +194,7 @@ mod tests {
             "a b c d e f g h".to_owned(),
         ]];
         let text = paragraphs(&["name", "mass, kg", ""], &rows, 14);
-        assert_eq!(text, "one\n  mass, kg:\n  1500\n  a b c d e f\n  g h");
+        assert_eq!(text, "one\n  mass, kg:\n  1500; a b c\n  d e f g h");
         assert!(text.lines().all(|line| line.len() <= 14));
     }
 }

@@ -174,6 +174,8 @@ pub(super) fn run_all(
     workers: usize,
     interrupt: &Interrupt,
 ) -> Vec<Result<RunResult>> {
+    let all = progress::bar(jobs.len(), "all runs");
+    all.tick();
     let next = AtomicUsize::new(0);
     let results: Vec<Mutex<Option<Result<RunResult>>>> =
         jobs.iter().map(|_| Mutex::new(None)).collect();
@@ -190,12 +192,14 @@ pub(super) fn run_all(
                     let made = job
                         .run(interrupt, &bar)
                         .with_context(|| format!("run {}", job.controller));
-                    bar.finish();
+                    bar.finish_and_clear();
+                    all.inc(1);
                     *result.lock().unwrap_or_else(PoisonError::into_inner) = Some(made);
                 }
             });
         }
     });
+    all.finish_and_clear();
     let made = results
         .into_iter()
         .map(|r| r.into_inner().unwrap_or_else(PoisonError::into_inner));

@@ -106,8 +106,7 @@ pub(super) fn controllers<'de, D: Deserializer<'de>>(
     entries
         .keys()
         .map(|name| {
-            let settings =
-                resolved(name, &entries).and_then(|entry| ControllerSettings::try_from(entry));
+            let settings = resolved(name, &entries).and_then(ControllerSettings::try_from);
             let wrong = |error| D::Error::custom(format!("in controllers.{name}: {error}"));
             Ok((name.clone(), settings.map_err(wrong)?))
         })

@@ -387,7 +387,7 @@ fn a_narrow_terminal_breaks_no_line() {
         );
     }
     let text = screen("record sedan-s1 --out .").unwrap_or_default();
-    assert_says(&text, &["left recording"]);
+    assert_says(&text, &[" % ", " recording"]);
     let text = screen("-q record sedan-s1 --out .").unwrap_or_default();
     assert_eq!(text.trim(), "");
 }
