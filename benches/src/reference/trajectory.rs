@@ -18,7 +18,13 @@ pub struct RunSummary {
     /// Time up to which the reference holds, s; `None` is to the end, and so is NaN.
     #[serde(default)]
     pub valid_until: Option<f64>,
+    /// Length of the run, s, where the summary gives it: a file that ends before is cut.
+    #[serde(default, rename = "T")]
+    pub duration_s: Option<f64>,
 }
+
+/// How far before its stated end a run may stop, s: a row or two.
+const END_TOLERANCE_S: f64 = 0.05;
 
 /// One sample of a trajectory, in ISO 8855 axes. The reference's own columns, SI units.
 #[allow(non_snake_case, reason = "names of the reference")]
@@ -145,6 +151,16 @@ impl Trajectory {
             path.display(),
             samples.len()
         );
+        let whole = summary.duration_s.filter(|duration| duration.is_finite());
+        let expected =
+            whole.map(|duration| summary.valid_until.map_or(duration, |t| t.min(duration)));
+        let last = samples[samples.len() - 1].t_s;
+        if let Some(expected) = expected.filter(|expected| last < expected - END_TOLERANCE_S) {
+            bail!(
+                "{} ends at {last} s, and summary.json says {expected} s: the file is cut",
+                path.display()
+            );
+        }
         Ok(Self { summary, samples })
     }
 }

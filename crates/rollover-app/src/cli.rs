@@ -2,35 +2,109 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand};
+use anyhow::Result;
+use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap_complete::Shell;
+
+use crate::output::print_text;
 
 /// Keeps a vehicle from rolling over by data-enabled predictive control.
 #[derive(Debug, Parser)]
-#[command(name = "rollover-app", version, about, max_term_width = 100)]
+#[command(
+    name = "rollover-app",
+    version,
+    about,
+    max_term_width = 100,
+    after_help = HELP
+)]
 pub struct Cli {
+    /// Print only errors and what is asked for: JSON, lists, files shown.
+    #[arg(short, long, global = true)]
+    pub quiet: bool,
     /// What to do.
     #[command(subcommand)]
     pub command: Command,
 }
 
+/// The end of the help.
+const HELP: &str = "\
+Examples:
+  rollover-app paper
+  rollover-app run sedan-s1 --controller rd-deepc-1
+  rollover-app scenarios show sedan-s1 > mine.toml
+  rollover-app scenarios check mine.toml
+
+Exit status:
+  0    done; a vehicle that rolls over is a result, not a failure
+  1    failed; the message says where and what to do
+  2    the command line is wrong
+  130  stopped by Ctrl-C or SIGTERM; the message says what was kept
+
+NO_COLOR=1 or CLICOLOR=0 turns colours off.";
+
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// The main job: the paper's sedan scenario with each controller, a table and a report.
+    #[command(after_help = "\
+Examples:
+  rollover-app paper
+  rollover-app paper --seed 3 --jobs 1 --out out/seed-3")]
     Paper(PaperArgs),
     /// One scenario with one controller: log, summary and report.
+    #[command(after_help = "\
+Examples:
+  rollover-app run sedan-s1
+  rollover-app run sedan-s1 --controller rd-deepc-1 --seed 3 --out out/mine
+  rollover-app run mine.toml --controller driver --speed 100 --json")]
     Run(RunArgs),
-    /// The ground of a scenario: a file to run on and to look into, and a picture.
-    Terrain(TerrainArgs),
     /// Records the data a controller works from, by the paper's recipe.
+    #[command(after_help = "\
+Examples:
+  rollover-app record sedan-s1 --seed 3
+  rollover-app run sedan-s1 --controller lmpc --recording out/sedan-s1/recording.csv")]
     Record(RecordArgs),
     /// Identifies a linear model from recordings: model file, report, figures.
+    #[command(after_help = "\
+Examples:
+  rollover-app identify out/sedan-s1/recording.csv
+  rollover-app identify pump-1.csv pump-2.csv --inputs pump,valve --outputs level --validate pump-3.csv")]
     Identify(IdentifyArgs),
     /// A standard manoeuvre with a vehicle: figures of merit, logs, pictures.
-    #[command(after_help = crate::manoeuvre::help())]
+    #[command(after_help = format!("\
+Examples:
+  rollover-app manoeuvre fishhook-1b
+  rollover-app manoeuvre sine-with-dwell --vehicle my-car.toml --out out/sine
+
+{}", crate::manoeuvre::help()))]
     Manoeuvre(ManoeuvreArgs),
+    /// The ground of a scenario: a file to run on and to look into, and a picture.
+    #[command(after_help = "\
+Examples:
+  rollover-app terrain mine.toml --out out/ground
+  rollover-app run mine.toml --terrain out/ground/terrain.npz")]
+    Terrain(TerrainArgs),
+    /// Lists the built-in scenarios and manoeuvres; checks and shows their files.
+    #[command(after_help = "\
+Examples:
+  rollover-app scenarios
+  rollover-app scenarios show sedan-s1 > mine.toml
+  rollover-app scenarios check mine.toml")]
+    Scenarios(ScenariosArgs),
     /// Lists the built-in vehicles; checks and shows vehicle files.
+    #[command(after_help = "\
+Examples:
+  rollover-app vehicles
+  rollover-app vehicles show sedan > my-car.toml
+  rollover-app vehicles check my-car.toml")]
     Vehicles(VehiclesArgs),
+    /// Prints a script by which a shell completes commands and options.
+    #[command(after_help = "\
+Examples:
+  rollover-app completions bash > ~/.local/share/bash-completion/completions/rollover-app
+  rollover-app completions zsh > ~/.zfunc/_rollover-app
+  rollover-app completions fish > ~/.config/fish/completions/rollover-app.fish")]
+    Completions(CompletionsArgs),
     /// Makes the interactive report from logs alone, also logs of a real vehicle.
     Report(ReportArgs),
 }
@@ -210,6 +284,52 @@ pub struct ManoeuvreArgs {
     pub json: bool,
 }
 
+/// Arguments of `scenarios`.
+#[derive(Debug, Args)]
+pub struct ScenariosArgs {
+    /// What to do instead of listing.
+    #[command(subcommand)]
+    pub action: Option<ScenariosAction>,
+    /// Print the list or what the check found as JSON on standard output.
+    #[arg(long, global = true)]
+    pub json: bool,
+}
+
+/// What to do with scenarios and manoeuvres.
+#[derive(Debug, Subcommand)]
+pub enum ScenariosAction {
+    /// Prints the file of a built-in scenario or manoeuvre, to start one of your own from.
+    Show {
+        /// Name of a built-in scenario or manoeuvre.
+        name: String,
+    },
+    /// Checks a scenario or manoeuvre file without driving anything.
+    Check {
+        /// Path of a file, or name of a built-in scenario or manoeuvre.
+        #[arg(value_name = "FILE")]
+        file: String,
+    },
+}
+
+/// Arguments of `completions`.
+#[derive(Debug, Args)]
+pub struct CompletionsArgs {
+    /// The shell.
+    pub shell: Shell,
+}
+
+/// Prints the completion script of a shell.
+///
+/// # Errors
+/// When standard output cannot be written.
+pub fn completions(args: &CompletionsArgs) -> Result<()> {
+    let mut command = Cli::command();
+    let name = command.get_name().to_owned();
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, &mut command, name, &mut script);
+    print_text(&String::from_utf8(script)?)
+}
+
 /// Arguments of `vehicles`.
 #[derive(Debug, Args)]
 pub struct VehiclesArgs {
@@ -241,7 +361,7 @@ pub enum VehiclesAction {
     Schema,
 }
 
-fn friction(text: &str) -> Result<f64, String> {
+fn friction(text: &str) -> std::result::Result<f64, String> {
     match text.parse::<f64>() {
         Ok(friction) if (0.01..=1.5).contains(&friction) => Ok(friction),
         Ok(friction) => Err(format!("{friction} is not in [0.01, 1.5]")),
@@ -263,7 +383,7 @@ fn column_name(text: &str) -> Result<(String, String), String> {
     ))
 }
 
-fn speed_kmh(text: &str) -> Result<f64, String> {
+fn speed_kmh(text: &str) -> std::result::Result<f64, String> {
     match text.parse::<f64>() {
         Ok(speed) if (10.0..=250.0).contains(&speed) => Ok(speed),
         Ok(speed) => Err(format!("{speed} km/h is not in [10, 250]")),

@@ -5,6 +5,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use thiserror::Error;
 
+/// Exit status of a program that could not do its work. A wrong command line has clap's 2.
+pub const FAILED_STATUS: i32 = 1;
+
 /// Exit status of a program stopped by Ctrl-C, as shells report it.
 pub const INTERRUPTED_STATUS: i32 = 130;
 

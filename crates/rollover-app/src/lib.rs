@@ -8,7 +8,7 @@
 //! [`scenario`] says what is driven; [`record`] makes the data a controller works from;
 //! [`closed_loop`] runs one controller on one scenario and writes a [`run_log`]; [`campaign`]
 //! arranges runs; [`summary`] and [`report`] read logs only. [`manoeuvre`] drives a standard manoeuvre
-//! without a controller.
+//! without a controller; [`timing`] measures what a step costs.
 
 pub mod campaign;
 pub mod cli;
@@ -17,12 +17,16 @@ pub mod identify;
 pub mod interrupt;
 pub mod manoeuvre;
 pub mod output;
+pub mod progress;
 pub mod record;
 pub mod report;
 pub mod run_log;
 pub mod scenario;
+pub mod scenarios_command;
 pub mod summary;
 pub mod terrain;
+pub mod timing;
+pub mod toml_place;
 pub mod vehicles_command;
 
 use anyhow::Result;
@@ -41,7 +45,9 @@ pub fn execute(command: &cli::Command, interrupt: &Interrupt) -> Result<()> {
         cli::Command::Record(args) => campaign::record_only(args, interrupt),
         cli::Command::Identify(args) => identify::identify(args, interrupt),
         cli::Command::Manoeuvre(args) => manoeuvre::manoeuvre(args, interrupt),
+        cli::Command::Scenarios(args) => scenarios_command::scenarios(args),
         cli::Command::Vehicles(args) => vehicles_command::vehicles(args),
         cli::Command::Report(args) => report::command(args),
+        cli::Command::Completions(args) => cli::completions(args),
     }
 }

@@ -16,6 +16,7 @@ use vehicle_dyn::parameters::VehicleParameters;
 use crate::closed_loop::{DrivenVehicle, INPUTS, OUTPUTS};
 use crate::interrupt::Interrupt;
 use crate::output::write_whole;
+use crate::progress;
 use crate::scenario::Scenario;
 use crate::terrain;
 
@@ -73,6 +74,7 @@ pub fn record(
     let mut measured: Vec<f64> = Vec::with_capacity(samples);
     let mut ltr_abs_max = 0.0_f64;
     let mut deviation_m = 0.0_f64;
+    let bar = progress::bar(samples, "recording");
     for _ in 0..samples {
         interrupt.check("while recording", "no recording was written")?;
         let input = [
@@ -91,7 +93,9 @@ pub fn record(
             plant.outcome(),
             plant.observation().time_s,
         );
+        bar.inc(1);
     }
+    bar.finish_and_clear();
     let summary = RecordingSummary {
         scenario: scenario.name.clone(),
         vehicle: vehicle.name.clone(),

@@ -1,13 +1,15 @@
 //! `vehicles`: lists the built-in vehicles, checks a file, shows a file to start from.
 
-use anyhow::{Context, Result};
-use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
 use serde::Serialize;
 use vehicle_dyn::parameters::{Figure, VehicleParameters, schema};
 use vehicle_dyn::vehicles;
 
 use crate::cli::{VehiclesAction, VehiclesArgs};
-use crate::output::{print_json, print_line, print_text};
+use crate::output::{fitted_words, print_json, print_text, table_text};
+use crate::toml_place::suggested;
 
 /// `vehicles` and what stands behind it.
 ///
@@ -20,6 +22,23 @@ pub fn vehicles(args: &VehiclesArgs) -> Result<()> {
         Some(VehiclesAction::Show { name }) => show(name),
         Some(VehiclesAction::Schema) => print_text(&schema::schema_text()),
     }
+}
+
+/// A vehicle by name or file.
+///
+/// # Errors
+/// When it cannot be read or is refused; a misspelt name is answered with the one that is meant.
+pub fn load(name_or_path: &str) -> Result<VehicleParameters> {
+    let path = Path::new(name_or_path);
+    let is_name = path.extension().is_none() && !path.exists();
+    if is_name && vehicles::embedded_text(name_or_path).is_none() {
+        bail!(
+            "there is no vehicle `{name_or_path}`{}; give the path of a vehicle file or one of: {}",
+            suggested(name_or_path, vehicles::names()),
+            vehicles::names().join(", ")
+        );
+    }
+    Ok(vehicles::find(name_or_path)?)
 }
 
 /// A line of the list.
@@ -57,7 +76,7 @@ fn list(args: &VehiclesArgs) -> Result<()> {
     if args.json {
         return print_json(&rows);
     }
-    let mut table = table(&[
+    let header = [
         "vehicle",
         "mass, kg",
         "wheelbase, m",
@@ -65,9 +84,9 @@ fn list(args: &VehiclesArgs) -> Result<()> {
         "lift-off, g",
         "grip, g",
         "description",
-    ]);
-    for row in rows {
-        table.add_row(vec![
+    ];
+    let cells = |row: Listed| {
+        vec![
             row.name.to_owned(),
             format!("{:.0}", row.total_mass_kg),
             format!("{:.2}", row.wheelbase_m),
@@ -75,18 +94,19 @@ fn list(args: &VehiclesArgs) -> Result<()> {
             format!("{:.2}", row.lift_off_g),
             format!("{:.2}", row.grip_on_two_wheels_g),
             row.description,
-        ]);
-    }
-    align_right(&mut table, 1..6);
-    print_line(&table.to_string())?;
-    print_line(&format!(
+        ]
+    };
+    let rows: Vec<_> = rows.into_iter().map(cells).collect();
+    let words = format!(
         "SSF: static stability factor, half the track over the height of the centre of gravity.\n\
          lift-off: lateral acceleration at which the second inner wheel leaves the ground in a slowly \
          tightening turn, from the parameters; the body rolls, the tyres give way.\n\
          grip: what the outer wheels hold then on a road of friction {}. With less grip than lift-off \
          a vehicle slides in a steady turn, but a quick manoeuvre may still lift it.",
         args.friction
-    ))
+    );
+    let table = table_text(&header, &rows, &[1, 2, 3, 4, 5]);
+    print_text(&format!("{table}\n{}\n", fitted_words(&words)))
 }
 
 /// The report on one vehicle.
@@ -106,7 +126,7 @@ struct CheckedFigure {
 }
 
 fn check(args: &VehiclesArgs, name_or_path: &str) -> Result<()> {
-    let vehicle = vehicles::find(name_or_path)?;
+    let vehicle = load(name_or_path)?;
     let figures = vehicle.figures(args.friction);
     if args.json {
         return print_json(&Checked {
@@ -122,17 +142,18 @@ fn check(args: &VehiclesArgs, name_or_path: &str) -> Result<()> {
                 .collect(),
         });
     }
-    print_line(&format!(
-        "{}: {}\nEvery value is allowed. What follows from them, on a level road of friction {}:",
-        vehicle.name, vehicle.description, args.friction
-    ))?;
-    print_line(&figure_table(&figures))?;
-    print_line(&verdict(&vehicle, &figures))
+    print_text(&format!(
+        "{}: {}\nEvery value is allowed. What follows from them, on a level road of friction {}:\n{}\n{}\n",
+        vehicle.name,
+        vehicle.description,
+        args.friction,
+        figure_table(&figures),
+        verdict(&vehicle, &figures)
+    ))
 }
 
 fn figure_table(figures: &[Figure]) -> String {
-    let mut table = table(&["figure", "value", "unit", "usual", ""]);
-    for figure in figures {
+    let cells = |figure: &Figure| {
         let usual = figure.usual.map_or_else(String::new, |[low, high]| {
             if high.is_finite() {
                 format!("{low} to {high}")
@@ -145,16 +166,16 @@ fn figure_table(figures: &[Figure]) -> String {
         } else {
             format!("looks like a wrong unit? See {}", figure.from)
         };
-        table.add_row(vec![
+        vec![
             figure.name.to_owned(),
             short(figure.value),
             figure.unit.to_owned(),
             usual,
             flag,
-        ]);
-    }
-    align_right(&mut table, 1..2);
-    table.to_string()
+        ]
+    };
+    let rows: Vec<_> = figures.iter().map(cells).collect();
+    table_text(&["figure", "value", "unit", "usual", ""], &rows, &[1])
 }
 
 fn verdict(vehicle: &VehicleParameters, figures: &[Figure]) -> String {
@@ -177,7 +198,8 @@ fn verdict(vehicle: &VehicleParameters, figures: &[Figure]) -> String {
 fn show(name: &str) -> Result<()> {
     let text = vehicles::embedded_text(name).with_context(|| {
         format!(
-            "there is no built-in vehicle `{name}`: choose one of {}",
+            "there is no built-in vehicle `{name}`{}: choose one of {}",
+            suggested(name, vehicles::names()),
             vehicles::names().join(", ")
         )
     })?;
@@ -193,21 +215,4 @@ fn short(value: f64) -> String {
         _ => 3,
     };
     format!("{value:.decimals$}")
-}
-
-fn table(header: &[&str]) -> Table {
-    let mut table = Table::new();
-    table
-        .load_style(presets::NOTHING)
-        .set_content_arrangement(ContentArrangement::Disabled)
-        .set_header(header.to_vec());
-    table
-}
-
-fn align_right(table: &mut Table, columns: std::ops::Range<usize>) {
-    for index in columns {
-        if let Some(column) = table.column_mut(index) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
 }

@@ -352,3 +352,15 @@ fn a_vehicle_written_and_read_again_is_the_same() {
         sedan()
     );
 }
+
+#[test]
+fn a_name_that_would_leave_the_folder_of_results_is_refused() {
+    for name in ["../../x", ".hidden", "a/b", "a\\b"] {
+        let vehicle = VehicleParameters {
+            name: name.to_owned(),
+            ..sedan()
+        };
+        let message = vehicle.check().expect_err("refused").to_string();
+        assert!(message.contains(&format!("name = `{name}`")), "{message}");
+    }
+}

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context, Result, anyhow};
-use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use sysid::{Identification, Progress};
 use vehicle_dyn::parameters::VehicleParameters;
 use vehicle_dyn::terrain::Terrain;
@@ -13,6 +13,7 @@ use vehicle_dyn::terrain::Terrain;
 use crate::closed_loop::{self, Built, Recorded, Run, Watch};
 use crate::interrupt::Interrupt;
 use crate::output::{create_folder, write_json, write_whole};
+use crate::progress;
 use crate::report::{self, REPORT_FILE, SCENE_FILE, SceneFile};
 use crate::scenario::Scenario;
 use crate::summary::{ModelSummary, RunIdentity, Summary};
@@ -47,8 +48,9 @@ impl Job<'_> {
         let built = match (settings, self.recorded) {
             (Some(settings), Some(recorded)) => {
                 let progress = |progress: &Progress| {
-                    let (done, total) = (progress.done + 1, progress.total);
-                    bar.set_message(format!("{} ({done} of {total})", progress.stage));
+                    bar.set_length(progress.total as u64);
+                    bar.set_position(progress.done as u64);
+                    bar.set_message(format!("{}: {}", self.controller, progress.stage));
                 };
                 let watch = Watch {
                     interrupt,
@@ -66,8 +68,7 @@ impl Job<'_> {
         let (controller, identification) = built.map_or((None, None), |built: Built| {
             (Some(built.controller), built.identification)
         });
-        bar.set_message("");
-        bar.reset_elapsed();
+        progress::begin(bar, self.scenario.steps(), self.controller);
         interrupt.check("before the first step", "nothing was written")?;
         create_folder(&self.out)?;
         remove_old_results(&self.out)?;
@@ -147,7 +148,8 @@ pub(super) fn run_all(
     workers: usize,
     interrupt: &Interrupt,
 ) -> Vec<Result<RunResult>> {
-    let bars = MultiProgress::new();
+    let all = progress::bar(jobs.len(), "all runs");
+    all.tick();
     let next = AtomicUsize::new(0);
     let results: Vec<Mutex<Option<Result<RunResult>>>> =
         jobs.iter().map(|_| Mutex::new(None)).collect();
@@ -160,16 +162,18 @@ pub(super) fn run_all(
                     .then(|| next.fetch_add(1, Ordering::Relaxed))
                     .and_then(|index| jobs.get(index).zip(results.get(index)))
                 {
-                    let bar = bars.add(step_bar(job.scenario, job.controller));
+                    let bar = step_bar(job.scenario, job.controller);
                     let made = job
                         .run(interrupt, &bar)
                         .with_context(|| format!("run {}", job.controller));
-                    bar.finish();
+                    bar.finish_and_clear();
+                    all.inc(1);
                     *result.lock().unwrap_or_else(PoisonError::into_inner) = Some(made);
                 }
             });
         }
     });
+    all.finish_and_clear();
     let made = results
         .into_iter()
         .map(|r| r.into_inner().unwrap_or_else(PoisonError::into_inner));
@@ -182,10 +186,5 @@ pub(super) fn cores() -> usize {
 }
 
 pub(super) fn step_bar(scenario: &Scenario, name: &str) -> ProgressBar {
-    let style =
-        ProgressStyle::with_template("{prefix:20} {bar:32} {percent:>3} %  {eta} left  {msg}")
-            .unwrap_or_else(|_| ProgressStyle::default_bar());
-    ProgressBar::new(scenario.steps() as u64)
-        .with_style(style)
-        .with_prefix(name.to_owned())
+    progress::bar(scenario.steps(), name)
 }

@@ -229,7 +229,7 @@ fn scenario_with_vehicle(
 }
 
 fn load_vehicle(name_or_path: &str) -> Result<VehicleParameters> {
-    Ok(vehicle_dyn::vehicles::find(name_or_path)?)
+    crate::vehicles_command::load(name_or_path)
 }
 
 pub(crate) fn default_folder(scenario: &Scenario) -> PathBuf {

@@ -59,6 +59,21 @@ fn deepc(
     by_data: &DataSettings,
     data: &Dataset,
 ) -> Result<Box<dyn Controller>> {
+    let (predictor, program) = deepc_problem(scenario, settings, by_data, data)?;
+    let controller = DeepcController::condensed(&predictor, &program, receding(settings))?;
+    Ok(Box::new(controller))
+}
+
+/// What a controller on data solves, whatever form it is solved in.
+///
+/// # Errors
+/// As [`controller`].
+pub(crate) fn deepc_problem(
+    scenario: &Scenario,
+    settings: &ControllerSettings,
+    by_data: &DataSettings,
+    data: &Dataset,
+) -> Result<(Predictor, DeepcSettings)> {
     let horizons = Horizons {
         past: settings.past_steps,
         future: settings.horizon_steps,
@@ -91,8 +106,7 @@ fn deepc(
             Slack::Hard,
         )
     };
-    let controller = DeepcController::condensed(&predictor, &program, receding(settings))?;
-    Ok(Box::new(controller))
+    Ok((predictor, program))
 }
 
 fn linear_mpc(

@@ -13,6 +13,7 @@ use vehicle_dyn::metrics::{Outcome, two_wheel_clearance_m};
 use vehicle_dyn::parameters::VehicleParameters;
 use vehicle_dyn::terrain::Terrain;
 
+pub(crate) use build::deepc_problem;
 pub use build::{Built, controller};
 pub use plant::{DrivenVehicle, INPUTS, OUTPUTS};
 pub use recorded::{Recorded, Watch};

@@ -14,7 +14,6 @@ use std::ops::ControlFlow;
 
 use anyhow::Result;
 use deepc_core::data::{Dataset, Record};
-use indicatif::{ProgressBar, ProgressStyle};
 use sysid::{
     Identification, IdentificationSettings, Progress, SysidError, Validation, ValidationSettings,
     identify_with,
@@ -23,6 +22,7 @@ use sysid::{
 use crate::cli::IdentifyArgs;
 use crate::interrupt::Interrupt;
 use crate::output::{print_json, print_line};
+use crate::progress;
 use results::{JudgedOn, Results};
 
 /// What an interruption leaves.
@@ -89,9 +89,7 @@ fn with_progress(
     settings: &IdentificationSettings,
     interrupt: &Interrupt,
 ) -> Result<Identification> {
-    let style = ProgressStyle::with_template("{msg:34} {bar:32} {percent:>3} %  {elapsed}")
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
-    let bar = ProgressBar::new(0).with_style(style);
+    let bar = progress::bar(0, "identification");
     let mut show = |progress: &Progress| {
         if interrupt.is_raised() {
             return ControlFlow::Break(());

@@ -3,6 +3,7 @@
 use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
 use comfy_table::{CellAlignment, Table};
 
+use crate::output::fitted;
 use crate::summary::Summary;
 
 /// Column headings shared by the terminal's table and the page.
@@ -58,14 +59,15 @@ pub(super) fn time_cells(run: &Summary) -> Vec<String> {
 pub fn summary_table(runs: &[Summary]) -> String {
     let mut table = Table::new();
     table.load_style(UTF8_HORIZONTAL_ONLY);
-    table.set_header(HEADINGS.iter().chain(&TIME_HEADINGS));
-    for run in runs {
-        table.add_row(cells(run).into_iter().chain(time_cells(run)));
-    }
+    let header: Vec<&str> = HEADINGS.into_iter().chain(TIME_HEADINGS).collect();
+    let row = |run: &Summary| cells(run).into_iter().chain(time_cells(run)).collect();
+    let rows: Vec<Vec<String>> = runs.iter().map(row).collect();
+    table.set_header(&header);
+    table.add_rows(&rows);
     for (index, column) in table.column_iter_mut().enumerate() {
         if index != 0 && index != 2 {
             column.set_cell_alignment(CellAlignment::Right);
         }
     }
-    table.to_string()
+    fitted(table.to_string(), &header, &rows)
 }

@@ -9,10 +9,12 @@ use vehicle_dyn::road::Course;
 use vehicle_dyn::sensors::{Channel, Sensor, SensorError};
 use vehicle_dyn::terrain::GroundError;
 
+use super::place::malformed;
 use super::{
     CONTROLLER_CHANNEL, ControllerSettings, DRIVER_CHANNELS, ModelSettings, Prediction, Scenario,
 };
 use crate::record::INPUT_COLUMNS;
+use crate::toml_place::{Place, suggested};
 
 /// Scenarios that travel with the binary.
 const EMBEDDED: [(&str, &str); 1] = [(
@@ -44,12 +46,12 @@ pub enum ScenarioError {
         source: std::io::Error,
     },
     /// The file is not a scenario.
-    #[error("{origin} is not a scenario")]
+    #[error("{origin} is not a scenario: {message}")]
     Malformed {
         /// The file or the embedded name.
         origin: String,
-        /// Where and what, from the parser.
-        source: Box<toml::de::Error>,
+        /// What, from the parser, and what may be meant.
+        message: String,
     },
     /// A value is out of its range.
     #[error("{origin}: `{field}` = {value}: must be {allowed}")]
@@ -93,13 +95,25 @@ pub enum ScenarioError {
         /// The vehicle.
         vehicle: String,
     },
+    /// What is wrong, with its place in the file.
+    #[error("{error}\n{place}")]
+    At {
+        /// What is wrong.
+        error: Box<ScenarioError>,
+        /// Where.
+        place: Place,
+    },
     /// The scenario has no such controller.
-    #[error("scenario {scenario} has no controller `{controller}`: choose one of {known}")]
+    #[error(
+        "scenario {scenario} has no controller `{controller}`{suggestion}: choose one of {known}"
+    )]
     UnknownController {
         /// The scenario.
         scenario: String,
         /// What was asked for.
         controller: String,
+        /// " (did you mean `x`?)" or nothing.
+        suggestion: String,
         /// The controllers it has.
         known: String,
     },
@@ -145,12 +159,7 @@ impl Scenario {
 
 fn unknown(name: &str) -> ScenarioError {
     let names = embedded_names();
-    let closest = names
-        .iter()
-        .max_by(|a, b| strsim::jaro_winkler(a, name).total_cmp(&strsim::jaro_winkler(b, name)));
-    let suggestion = closest
-        .filter(|c| strsim::jaro_winkler(c, name) > 0.75)
-        .map_or_else(String::new, |c| format!(" (did you mean `{c}`?)"));
+    let suggestion = suggested(name, names.iter().copied());
     let suggestion = if vehicle_dyn::manoeuvre::names().contains(&name) {
         format!(" (it is a manoeuvre: `rollover-app manoeuvre {name}`)")
     } else {
@@ -163,12 +172,23 @@ fn unknown(name: &str) -> ScenarioError {
     }
 }
 
+/// Text of a scenario that travels with the binary.
+#[must_use]
+pub fn embedded_text(name: &str) -> Option<&'static str> {
+    let found = EMBEDDED.iter().find(|(known, _)| *known == name);
+    found.map(|(_, text)| *text)
+}
+
 fn parse(text: &str, origin: &str) -> Result<Scenario, ScenarioError> {
-    let scenario: Scenario = toml::from_str(text).map_err(|source| ScenarioError::Malformed {
-        origin: origin.to_owned(),
-        source: Box::new(source),
+    let scenario: Scenario =
+        toml::from_str(text).map_err(|error| malformed(&error, text, origin))?;
+    let checked = Check { origin }.scenario(&scenario);
+    checked.map_err(|error| {
+        let place = error
+            .field()
+            .and_then(|field| Place::of_field(text, &field));
+        error.at(place)
     })?;
-    Check { origin }.scenario(&scenario)?;
     Ok(scenario)
 }
 

@@ -3,6 +3,7 @@
 mod controller_file;
 mod controllers;
 mod load;
+mod place;
 
 use std::collections::BTreeMap;
 
@@ -16,7 +17,9 @@ use vehicle_dyn::terrain::GroundDescription;
 pub use controllers::{
     ControllerSettings, DataMatrix, DataSettings, LtrPenalty, ModelSettings, Prediction,
 };
-pub use load::{ScenarioError, embedded_names, load};
+pub use load::{ScenarioError, embedded_names, embedded_text, load};
+
+use crate::toml_place::suggested;
 
 /// Name of the controller that every scenario has: the driver alone.
 pub const DRIVER: &str = "driver";
@@ -120,6 +123,7 @@ impl Scenario {
             .ok_or_else(|| ScenarioError::UnknownController {
                 scenario: self.name.clone(),
                 controller: name.to_owned(),
+                suggestion: suggested(name, self.controller_names()),
                 known: self.controller_names().join(", "),
             })
     }

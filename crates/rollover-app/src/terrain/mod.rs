@@ -17,6 +17,7 @@ use crate::campaign::default_folder;
 use crate::cli::TerrainArgs;
 use crate::interrupt::{Interrupt, Interrupted};
 use crate::output::{create_folder, print_json, print_line, write_json, write_whole};
+use crate::progress;
 use crate::scenario::{self, Scenario};
 
 /// Names of the files written.
@@ -34,14 +35,19 @@ pub fn build(
     interrupt: &Interrupt,
 ) -> Result<Terrain> {
     let course = Course::new(course)?;
-    let mut follow = |_: usize, _: usize| {
+    let bar = progress::bar(0, "terrain");
+    let mut follow = |done: usize, total: usize| {
+        bar.set_length(total as u64);
+        bar.set_position(done as u64);
         if interrupt.is_raised() {
             ControlFlow::Break(())
         } else {
             ControlFlow::Continue(())
         }
     };
-    match Terrain::build_with(ground, &course, &mut follow) {
+    let made = Terrain::build_with(ground, &course, &mut follow);
+    bar.finish_and_clear();
+    match made {
         Err(TerrainError::Interrupted { done, total }) => Err(Interrupted {
             after: format!("after {done} of {total} tiles of the terrain"),
             kept: "no terrain was written".into(),

@@ -1,6 +1,7 @@
 //! The `rollover-app` command as a user meets it.
 
 mod bad_input;
+mod cli;
 mod identify;
 mod identify_bad_input;
 mod interruption;

@@ -68,6 +68,16 @@ pub enum ParameterError {
         /// Name of the file.
         origin: String,
     },
+    /// The name cannot stand in the name of a folder, where results go.
+    #[error(
+        "name = `{name}` in {origin}: must not begin with `.` nor hold `/`, `\\` or control characters"
+    )]
+    BadName {
+        /// Name found.
+        name: String,
+        /// Name of the file.
+        origin: String,
+    },
     /// A value outside its allowed range.
     #[error("{field} = {value} in {origin}: must be in {range}")]
     OutOfRange {
