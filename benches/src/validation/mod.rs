@@ -1,6 +1,6 @@
 //! What is known about the rightness of `vehicle-dyn`, as rows of target, tolerance and result.
 //!
-//! [`reference`] holds a vehicle against the trajectories of an independent model, the other modules
+//! [`mod@reference`] holds a vehicle against the trajectories of an independent model, the other modules
 //! hold it against theory. The program `vehicle-validation` writes them all into a report; tests
 //! require them one by one.
 
