@@ -116,7 +116,7 @@ fn a_run_is_reproducible_and_says_what_the_data_do_not_identify() {
             "--controller",
             "lmpc",
             "--seed",
-            "5",
+            "10",
             "--out",
             out,
         ];
