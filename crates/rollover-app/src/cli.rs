@@ -45,11 +45,14 @@ NO_COLOR=1 or CLICOLOR=0 turns colours off.";
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// The main job: the paper's sedan scenario with each controller, a table and a report.
+    /// The main job: every experiment of the paper, its claims judged, a report.
     #[command(after_help = "\
 Examples:
   rollover-app paper
-  rollover-app paper --seed 3 --jobs 1 --out out/seed-3")]
+  rollover-app paper --quick
+  rollover-app paper --only sedan-s1 --seeds 0-9 --out out/tuning
+
+Interrupted, or run again, it makes only the runs that are not there yet.")]
     Paper(PaperArgs),
     /// One scenario with one controller: log, summary and report.
     #[command(after_help = "\
@@ -136,18 +139,34 @@ pub struct ReportArgs {
 /// Arguments of `paper`.
 #[derive(Debug, Args)]
 pub struct PaperArgs {
-    /// Seed of the recording the controllers share.
-    #[arg(long, default_value_t = 10)]
-    pub seed: u64,
+    /// A first look: two recording seeds, and one moment in the table of times.
+    #[arg(long)]
+    pub quick: bool,
+    /// Recording seeds; the logs of the first are kept. [default: 10-19, which no setting was chosen on]
+    #[arg(long, value_name = "FIRST-LAST", value_parser = seeds)]
+    pub seeds: Option<Seeds>,
+    /// Scenarios; by default all of the paper.
+    #[arg(long, value_name = "SCENARIO,…", value_delimiter = ',', value_parser = paper_scenario)]
+    pub only: Vec<String>,
     /// Folder for the results.
     #[arg(long, default_value = "out/paper", value_name = "DIR")]
     pub out: PathBuf,
-    /// Runs at once; by default one per core.
+    /// Threads; by default one per core. The results do not depend on it.
     #[arg(long, value_name = "N")]
     pub jobs: Option<std::num::NonZeroUsize>,
-    /// Print the summaries as JSON on standard output instead of the table.
+    /// Print the results as JSON, as in paper.json, on standard output instead of the tables.
     #[arg(long)]
     pub json: bool,
+}
+
+/// Recording seeds from first to last.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Seeds(pub std::ops::RangeInclusive<u64>);
+
+impl std::fmt::Display for Seeds {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}-{}", self.0.start(), self.0.end())
+    }
 }
 
 /// Arguments of `run`.
@@ -177,6 +196,10 @@ pub struct RunArgs {
     /// Speed at the start and reference afterwards, instead of the scenario's.
     #[arg(long, value_name = "KMH", value_parser = speed_kmh, allow_negative_numbers = true)]
     pub speed: Option<f64>,
+    /// Drive the mirror image: the course and its ground with left and right exchanged. The recording
+    /// stays as it is.
+    #[arg(long)]
+    pub mirror: bool,
     /// Print the summary as JSON on standard output.
     #[arg(long)]
     pub json: bool,
@@ -379,6 +402,36 @@ fn column_name(text: &str) -> Result<(String, String), String> {
     }
     Err(format!(
         "a log has no column `{ours}`, but {}",
+        known.join(", ")
+    ))
+}
+
+fn seeds(text: &str) -> std::result::Result<Seeds, String> {
+    const MOST: u64 = 1000;
+    let (first, last) = text.split_once('-').unwrap_or((text, text));
+    let number = |text: &str| {
+        let number = text.trim().parse::<u64>();
+        number.map_err(|_| format!("`{text}` is not a seed; write 10-19, or 10"))
+    };
+    let (first, last) = (number(first)?, number(last)?);
+    match last.checked_sub(first) {
+        None => Err(format!("{last} comes before {first}")),
+        Some(more) if more >= MOST => Err(format!(
+            "these are {} seeds, at most {MOST} are allowed",
+            more + 1
+        )),
+        Some(_) => Ok(Seeds(first..=last)),
+    }
+}
+
+fn paper_scenario(text: &str) -> std::result::Result<String, String> {
+    let known = crate::report::claims::SCENARIOS;
+    if known.contains(&text) {
+        return Ok(text.to_owned());
+    }
+    let suggestion = crate::toml_place::suggested(text, known);
+    Err(format!(
+        "no scenario of the paper{suggestion}: choose from {}",
         known.join(", ")
     ))
 }

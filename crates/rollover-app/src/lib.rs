@@ -7,7 +7,7 @@
 //!
 //! [`scenario`] says what is driven; [`record`] makes the data a controller works from;
 //! [`closed_loop`] runs one controller on one scenario and writes a [`run_log`]; [`campaign`]
-//! arranges runs; [`summary`] and [`report`] read logs only. [`manoeuvre`] drives a standard manoeuvre
+//! makes one run, [`mod@paper`] all of the paper; [`summary`] and [`report`] read logs only. [`manoeuvre`] drives a standard manoeuvre
 //! without a controller; [`timing`] measures what a step costs.
 
 pub mod campaign;
@@ -17,6 +17,7 @@ pub mod identify;
 pub mod interrupt;
 pub mod manoeuvre;
 pub mod output;
+pub mod paper;
 pub mod progress;
 pub mod record;
 pub mod report;
@@ -39,7 +40,7 @@ use interrupt::Interrupt;
 /// not an error.
 pub fn execute(command: &cli::Command, interrupt: &Interrupt) -> Result<()> {
     match command {
-        cli::Command::Paper(args) => campaign::paper(args, interrupt),
+        cli::Command::Paper(args) => paper::paper(args, interrupt),
         cli::Command::Run(args) => campaign::single(args, interrupt),
         cli::Command::Terrain(args) => terrain::command(args, interrupt),
         cli::Command::Record(args) => campaign::record_only(args, interrupt),

@@ -62,6 +62,9 @@ pub struct LogRow {
     pub speed_kmh: f64,
     /// Distance from the course's centre line, m, left positive.
     pub path_deviation_m: f64,
+    /// Distance along the course, m; absent in logs that do not know it.
+    #[serde(default)]
+    pub station_m: Option<f64>,
     /// Position east, m.
     pub x_m: f64,
     /// Position north, m.

@@ -27,6 +27,7 @@ fn row(step: u32) -> LogRow {
         roll_deg: -1.0 / 3.0,
         speed_kmh: 104.0 - k / 7.0,
         path_deviation_m: -k / 10.0,
+        station_m: Some(29.0 * k / 100.0),
         x_m: 29.0 * k / 100.0,
         y_m: 0.1,
         yaw_deg: 0.0,
@@ -50,7 +51,7 @@ fn identity() -> RunIdentity {
         seed: 7,
         recording: None,
         speed_reference_kmh: 105.0,
-        model: None,
+        ..RunIdentity::default()
     }
 }
 
@@ -177,7 +178,8 @@ fn a_summary_counts_what_the_log_holds() {
         "{}",
         summary.ltr_violation_s
     );
-    assert!((summary.cost - 100.0 * (2.0 * 9.0 + 0.5 * 4.0)).abs() < 1e-9);
+    let cost = summary.cost.expect("there are weights");
+    assert!((cost - 100.0 * (2.0 * 9.0 + 0.5 * 4.0)).abs() < 1e-9);
     assert!((summary.path_deviation_max_m - 10.0).abs() < 1e-12);
     assert!((summary.steering_correction_max_deg - 3.0).abs() < 1e-12);
     assert!((summary.speed_min_kmh - (104.0 - 100.0 / 7.0)).abs() < 1e-12);

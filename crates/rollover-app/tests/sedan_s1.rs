@@ -45,9 +45,10 @@ fn drive(name: &str, seed: u64, speed_reference_kmh: f64) -> Finished {
         terrain: Terrain::flat(scenario.ground.friction),
         speed_reference_kmh,
         seed,
+        fixed_target_speed_kmh: speed_reference_kmh,
         controller,
     };
-    run(order, log, &Interrupt::default(), || ()).expect("the simulation runs")
+    run(order, Some(log), &Interrupt::default(), || ()).expect("the simulation runs")
 }
 
 /// Station at which the last turn begins, m.

@@ -61,9 +61,10 @@ fn drive(
         speed_reference_kmh: scenario.speed_reference_kmh,
         seed,
         terrain: Terrain::flat(scenario.ground.friction),
+        fixed_target_speed_kmh: scenario.speed_reference_kmh,
         controller,
     };
-    run(order, log, &Interrupt::default(), || ())
+    run(order, Some(log), &Interrupt::default(), || ())
 }
 
 fn temporary_log() -> (tempfile::TempDir, PathBuf) {
@@ -190,7 +191,7 @@ fn a_run_with_drop_outs_ends_properly_and_the_log_shows_them() {
         seed: 10,
         recording: None,
         speed_reference_kmh: 105.0,
-        model: None,
+        ..RunIdentity::default()
     };
     let summary = Summary::of_log(identity, finished.outcome, &read, None, 0.01);
     assert_eq!(summary.ltr_lost_steps, lost);

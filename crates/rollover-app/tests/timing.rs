@@ -49,10 +49,11 @@ fn drive(scenario: &Scenario, recorded: &Recorded<'_>, name: &str, folder: &Path
         terrain: terrain.expect("the ground is good"),
         speed_reference_kmh: scenario.speed_reference_kmh,
         seed: SEED,
+        fixed_target_speed_kmh: scenario.speed_reference_kmh,
         controller: Some(built.expect("the recording is good").controller),
     };
     let log = folder.join(format!("{name}.csv"));
-    let finished = closed_loop::run(run, &log, &interrupt, || {}).expect("it runs");
+    let finished = closed_loop::run(run, Some(&log), &interrupt, || {}).expect("it runs");
     finished.rows
 }
 
@@ -71,7 +72,7 @@ struct Case {
 /// Logs of the three runs.
 type Logs = [Vec<LogRow>; 3];
 
-const NAMES: [&str; 3] = ["deepc-test", "rd-deepc-1", "lmpc-no-speed-effect"];
+const NAMES: [&str; 3] = ["deepc-test", "rd-deepc-1", "lmpc-1-no-speed-effect"];
 
 impl Case {
     fn new(steps: usize) -> Self {

@@ -1,10 +1,8 @@
-//! Making runs, several at a time.
+//! One run: its controller, the drive, and the files it leaves.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result};
 use indicatif::ProgressBar;
 use sysid::{Identification, Progress};
 use vehicle_dyn::parameters::VehicleParameters;
@@ -14,90 +12,105 @@ use crate::closed_loop::{self, Built, Recorded, Run, Watch};
 use crate::interrupt::Interrupt;
 use crate::output::{create_folder, write_json, write_whole};
 use crate::progress;
-use crate::report::{self, REPORT_FILE, SCENE_FILE, SceneFile};
+use crate::report::{
+    self, FAILURE_FILE, LOG_FILE, REPORT_FILE, SCENE_FILE, SUMMARY_FILE, SceneFile,
+};
 use crate::scenario::Scenario;
 use crate::summary::{ModelSummary, RunIdentity, Summary};
 
+/// What tells that a run's results are those of the same program and settings.
+pub(crate) const FINGERPRINT_FILE: &str = "fingerprint";
 const MAT_LOG: &str = "log.mat";
 const MODEL: &str = "model.json";
 const IDENTIFICATION_TEXT: &str = "identification.txt";
 const IDENTIFICATION_JSON: &str = "identification.json";
 
 /// One run to be made.
-pub(super) struct Job<'a> {
-    pub(super) scenario: &'a Scenario,
-    pub(super) vehicle: &'a VehicleParameters,
-    pub(super) terrain: Terrain,
-    pub(super) controller: &'a str,
-    pub(super) seed: u64,
-    pub(super) speed_reference_kmh: f64,
-    pub(super) recorded: Option<&'a Recorded<'a>>,
-    pub(super) recording: Option<&'a Path>,
-    pub(super) out: PathBuf,
-}
-
-/// A run that was made.
-pub(super) struct RunResult {
-    pub(super) summary: Summary,
+pub(crate) struct Job<'a> {
+    pub(crate) scenario: &'a Scenario,
+    pub(crate) vehicle: &'a VehicleParameters,
+    pub(crate) terrain: Terrain,
+    pub(crate) controller: &'a str,
+    pub(crate) seed: u64,
+    /// Whether `scenario` is the mirror image of the one in the file.
+    pub(crate) mirrored: bool,
+    pub(crate) speed_reference_kmh: f64,
+    pub(crate) recorded: Option<&'a Recorded<'a>>,
+    pub(crate) recording: Option<&'a Path>,
+    /// Whether its log is kept, and all that goes with a log; without, only the summary is.
+    pub(crate) logged: bool,
+    pub(crate) out: PathBuf,
 }
 
 impl Job<'_> {
     /// Runs, then writes the summary beside the log.
-    pub(super) fn run(&self, interrupt: &Interrupt, bar: &ProgressBar) -> Result<RunResult> {
+    pub(crate) fn run(&self, interrupt: &Interrupt, bar: &ProgressBar) -> Result<Summary> {
+        let built = self.build(interrupt, bar)?;
+        self.drive(built, interrupt, bar)
+    }
+
+    /// Makes the controller; nothing for [`DRIVER`](crate::scenario::DRIVER) and
+    /// [`FLOOR`](crate::scenario::FLOOR). Writes nothing.
+    pub(crate) fn build(&self, interrupt: &Interrupt, bar: &ProgressBar) -> Result<Option<Built>> {
         let settings = self.scenario.controller(self.controller)?;
-        let built = match (settings, self.recorded) {
-            (Some(settings), Some(recorded)) => {
-                let progress = |progress: &Progress| {
-                    bar.set_length(progress.total as u64);
-                    bar.set_position(progress.done as u64);
-                    bar.set_message(format!("{}: {}", self.controller, progress.stage));
-                };
-                let watch = Watch {
-                    interrupt,
-                    progress: &progress,
-                };
-                Some(closed_loop::controller(
-                    self.scenario,
-                    settings,
-                    recorded,
-                    watch,
-                )?)
-            }
-            _ => None,
+        let (Some(settings), Some(recorded)) = (settings, self.recorded) else {
+            return Ok(None);
         };
+        let progress = |progress: &Progress| {
+            bar.set_length(progress.total as u64);
+            bar.set_position(progress.done as u64);
+            bar.set_message(format!("{}: {}", self.controller, progress.stage));
+        };
+        let watch = Watch {
+            interrupt,
+            progress: &progress,
+        };
+        closed_loop::controller(self.scenario, settings, recorded, watch).map(Some)
+    }
+
+    /// Drives with the controller that was built, then writes the summary beside the log.
+    pub(crate) fn drive(
+        &self,
+        built: Option<Built>,
+        interrupt: &Interrupt,
+        bar: &ProgressBar,
+    ) -> Result<Summary> {
         let (controller, identification) = built.map_or((None, None), |built: Built| {
             (Some(built.controller), built.identification)
         });
         progress::begin(bar, self.scenario.steps(), self.controller);
-        interrupt.check("before the first step", "nothing was written")?;
+        interrupt.check("before the first step", "the run was not begun")?;
         create_folder(&self.out)?;
         remove_old_results(&self.out)?;
-        if let Some(identification) = &identification {
-            write_identification(&self.out, identification)?;
+        let log = self.out.join(LOG_FILE);
+        if self.logged {
+            self.describe(identification.as_deref())?;
         }
-        let described = SceneFile::new(self.scenario, self.vehicle, self.controller, self.seed)?;
-        write_whole(
-            &self.out.join(SCENE_FILE),
-            &(serde_json::to_string(&described)? + "\n"),
-        )?;
         let run = Run {
             scenario: self.scenario,
             vehicle: self.vehicle,
             terrain: self.terrain.clone(),
             speed_reference_kmh: self.speed_reference_kmh,
             seed: self.seed,
+            fixed_target_speed_kmh: self
+                .scenario
+                .fixed_target_speed_kmh(self.controller, self.speed_reference_kmh),
             controller,
         };
-        let log = self.out.join("log.csv");
-        let finished = closed_loop::run(run, &log, interrupt, || bar.inc(1))?;
+        let to = self.logged.then_some(log.as_path());
+        let finished = closed_loop::run(run, to, interrupt, || bar.inc(1))?;
+        let settings = self.scenario.controller(self.controller)?;
         let summary = Summary::of_log(
             RunIdentity {
                 scenario: self.scenario.name.clone(),
                 vehicle: self.vehicle.name.clone(),
                 controller: self.controller.to_owned(),
                 seed: self.seed,
+                mirrored: self.mirrored,
+                turns_m: self.scenario.course.turns_m(),
                 recording: self.recording.map(|file| file.display().to_string()),
                 speed_reference_kmh: self.speed_reference_kmh,
+                target_speed_bounds_kmh: settings.map(|_| self.scenario.bounds.target_speed_kmh),
                 model: identification.map(|i| ModelSummary::of_report(&i.report)),
             },
             finished.outcome,
@@ -105,11 +118,27 @@ impl Job<'_> {
             settings.map(|s| &s.input_weights),
             self.scenario.sample_time_s,
         );
-        write_json(&self.out.join("summary.json"), &summary)?;
-        // MATLAB reads this one without an import script.
-        let columns = report::log::read(&log, &report::log::Renamed::new()).columns;
-        report::mat::write(&self.out.join(MAT_LOG), &columns)?;
-        Ok(RunResult { summary })
+        if self.logged {
+            // MATLAB reads this one without an import script.
+            let columns = report::log::read(&log, &report::log::Renamed::new()).columns;
+            report::mat::write(&self.out.join(MAT_LOG), &columns)?;
+        }
+        write_json(&self.out.join(SUMMARY_FILE), &summary)?;
+        Ok(summary)
+    }
+
+    /// Writes what a log does not hold.
+    fn describe(&self, identification: Option<&Identification>) -> Result<()> {
+        if let Some(identification) = identification {
+            write_identification(&self.out, identification)?;
+        }
+        let mut described =
+            SceneFile::new(self.scenario, self.vehicle, self.controller, self.seed)?;
+        described.run.mirrored = self.mirrored;
+        write_whole(
+            &self.out.join(SCENE_FILE),
+            &(serde_json::to_string(&described)? + "\n"),
+        )
     }
 }
 
@@ -122,9 +151,11 @@ fn write_identification(folder: &Path, found: &Identification) -> Result<()> {
 
 /// Removes what an earlier run or campaign derived from its logs: beside fresh logs it would lie if
 /// this one is interrupted.
-pub(super) fn remove_old_results(folder: &Path) -> Result<()> {
+pub(crate) fn remove_old_results(folder: &Path) -> Result<()> {
     for name in [
-        "summary.json",
+        SUMMARY_FILE,
+        FAILURE_FILE,
+        FINGERPRINT_FILE,
         SCENE_FILE,
         MAT_LOG,
         MODEL,
@@ -142,49 +173,10 @@ pub(super) fn remove_old_results(folder: &Path) -> Result<()> {
     report::remove_old(&folder.join(REPORT_FILE))
 }
 
-/// Makes the runs, `workers` at a time, in the order given.
-pub(super) fn run_all(
-    jobs: &[Job<'_>],
-    workers: usize,
-    interrupt: &Interrupt,
-) -> Vec<Result<RunResult>> {
-    let all = progress::bar(jobs.len(), "all runs");
-    all.tick();
-    let next = AtomicUsize::new(0);
-    let results: Vec<Mutex<Option<Result<RunResult>>>> =
-        jobs.iter().map(|_| Mutex::new(None)).collect();
-    std::thread::scope(|scope| {
-        for _ in 0..workers.min(jobs.len()) {
-            scope.spawn(|| {
-                // A run that has not begun when the user stops the program leaves what an earlier
-                // one wrote in its folder.
-                while let Some((job, result)) = (!interrupt.is_raised())
-                    .then(|| next.fetch_add(1, Ordering::Relaxed))
-                    .and_then(|index| jobs.get(index).zip(results.get(index)))
-                {
-                    let bar = step_bar(job.scenario, job.controller);
-                    let made = job
-                        .run(interrupt, &bar)
-                        .with_context(|| format!("run {}", job.controller));
-                    bar.finish_and_clear();
-                    all.inc(1);
-                    *result.lock().unwrap_or_else(PoisonError::into_inner) = Some(made);
-                }
-            });
-        }
-    });
-    all.finish_and_clear();
-    let made = results
-        .into_iter()
-        .map(|r| r.into_inner().unwrap_or_else(PoisonError::into_inner));
-    made.map(|r| r.unwrap_or_else(|| Err(anyhow!("the run was not begun"))))
-        .collect()
-}
-
-pub(super) fn cores() -> usize {
+pub(crate) fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
 }
 
-pub(super) fn step_bar(scenario: &Scenario, name: &str) -> ProgressBar {
+pub(crate) fn step_bar(scenario: &Scenario, name: &str) -> ProgressBar {
     progress::bar(scenario.steps(), name)
 }

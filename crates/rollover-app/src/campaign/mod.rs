@@ -1,6 +1,6 @@
-//! Arranges runs: one, or all of the paper's at once; writes their results.
+//! Makes one run or one recording, and writes their results. [`crate::paper`] makes many.
 
-mod job;
+pub(crate) mod job;
 
 use std::path::{Path, PathBuf};
 
@@ -8,82 +8,27 @@ use anyhow::{Result, ensure};
 use deepc_core::data::Dataset;
 use vehicle_dyn::parameters::VehicleParameters;
 
-use crate::cli::{PaperArgs, RecordArgs, RunArgs};
+use crate::cli::{RecordArgs, RunArgs};
 use crate::closed_loop::Recorded;
 use crate::interrupt::Interrupt;
 use crate::output::{create_folder, print_json, print_line, write_json};
 use crate::record::{self, record};
 use crate::report::{self, REPORT_FILE};
-use crate::scenario::{self, DRIVER, Scenario};
+use crate::scenario::{self, Scenario};
 use crate::summary::Summary;
 use crate::terrain;
-use job::{Job, RunResult, cores, remove_old_results, run_all, step_bar};
-
-/// The main job's scenario and controllers.
-const PAPER_SCENARIO: &str = "sedan-s1";
-const PAPER_QUESTION: &str = "Does a controller that knows the vehicle only from a recorded drive keep it on its wheels where the driver alone rolls over? And how does control on a model identified from the same recording do?";
-const PAPER_CONTROLLERS: [&str; 6] = [
-    DRIVER,
-    "rd-deepc-1",
-    "rd-deepc-2",
-    "rd-deepc-1-paper",
-    "lmpc",
-    "lmpc-no-speed-effect",
-];
-
-/// `paper`: every controller of the main job, a table and a report.
-///
-/// # Errors
-/// When a run cannot be made or a result cannot be written.
-pub fn paper(args: &PaperArgs, interrupt: &Interrupt) -> Result<()> {
-    let scenario = scenario::load(PAPER_SCENARIO)?;
-    let vehicle = load_vehicle(&scenario.vehicle)?;
-    create_folder(&args.out)?;
-    remove_old_results(&args.out)?;
-    let dataset = recording(&scenario, &vehicle, args.seed, &args.out, interrupt)?;
-    let recorded = Recorded::new(&dataset);
-    let terrain = terrain::build(&scenario.ground, &scenario.course, interrupt)?;
-    let job = |controller: &'static str| Job {
-        scenario: &scenario,
-        vehicle: &vehicle,
-        terrain: terrain.clone(),
-        controller,
-        seed: args.seed,
-        speed_reference_kmh: scenario.speed_reference_kmh,
-        recorded: (controller != DRIVER).then_some(&recorded),
-        recording: None,
-        out: args.out.join(controller),
-    };
-    let jobs: Vec<Job<'_>> = PAPER_CONTROLLERS.into_iter().map(job).collect();
-    let results = run_all(
-        &jobs,
-        args.jobs.map_or_else(cores, std::num::NonZero::get),
-        interrupt,
-    );
-    let runs = all_or_every_error(results)?;
-
-    let summaries: Vec<Summary> = runs.into_iter().map(|run| run.summary).collect();
-    let folders = PAPER_CONTROLLERS.map(|controller| args.out.join(controller));
-    let mut report = report::collect(&folders, &report::log::Renamed::new());
-    report.title = format!("Rollover prevention: {} on {}", vehicle.name, scenario.name);
-    report.asked = vec![PAPER_QUESTION.into()];
-    report.provenance.command = format!("rollover-app paper --seed {}", args.seed);
-    let written = report::write(&report, &args.out.join(REPORT_FILE))?;
-    if args.json {
-        print_json(&summaries)
-    } else {
-        print_line(&report::summary_table(&summaries))?;
-        print_models(&summaries)?;
-        print_line(&format!("report: {}", written.page.display()))
-    }
-}
+use job::{Job, step_bar};
 
 /// `run`: one controller on one scenario.
 ///
 /// # Errors
 /// When the run cannot be made or a result cannot be written.
 pub fn single(args: &RunArgs, interrupt: &Interrupt) -> Result<()> {
-    let (scenario, vehicle) = scenario_with_vehicle(&args.scenario, args.vehicle.as_deref())?;
+    let (mut scenario, vehicle) = scenario_with_vehicle(&args.scenario, args.vehicle.as_deref())?;
+    if args.mirror {
+        scenario = scenario.mirrored();
+    }
+    let scenario = scenario;
     let settings = scenario.controller(&args.controller)?;
     let speed_reference_kmh = args.speed.unwrap_or(scenario.speed_reference_kmh);
     scenario.check_road_at(speed_reference_kmh)?;
@@ -116,27 +61,30 @@ pub fn single(args: &RunArgs, interrupt: &Interrupt) -> Result<()> {
         terrain,
         controller: &args.controller,
         seed: args.seed,
+        mirrored: args.mirror,
         speed_reference_kmh,
         recorded: recorded.as_ref(),
         recording: args.recording.as_deref().filter(|_| recorded.is_some()),
+        logged: true,
         out,
     };
     let bar = step_bar(&scenario, &args.controller);
-    let result = job.run(interrupt, &bar)?;
+    let summary = job.run(interrupt, &bar)?;
     bar.finish_and_clear();
     let mut report = report::collect(std::slice::from_ref(&job.out), &report::log::Renamed::new());
     report.provenance.command = format!(
-        "rollover-app run {} --controller {} --seed {}",
-        args.scenario, args.controller, args.seed
+        "rollover-app run {} --controller {} --seed {}{}",
+        args.scenario,
+        args.controller,
+        args.seed,
+        if args.mirror { " --mirror" } else { "" }
     );
     let written = report::write(&report, &job.out.join(REPORT_FILE))?;
     if args.json {
-        print_json(&result.summary)
+        print_json(&summary)
     } else {
-        print_line(&report::summary_table(std::slice::from_ref(
-            &result.summary,
-        )))?;
-        print_models(std::slice::from_ref(&result.summary))?;
+        print_line(&report::summary_table(std::slice::from_ref(&summary)))?;
+        print_models(std::slice::from_ref(&summary))?;
         print_line(&format!(
             "results: {}\nreport: {}",
             job.out.display(),
@@ -184,25 +132,8 @@ fn print_models(summaries: &[Summary]) -> Result<()> {
     Ok(())
 }
 
-/// The runs, or one error that tells of all that were not made.
-fn all_or_every_error(results: Vec<Result<RunResult>>) -> Result<Vec<RunResult>> {
-    let (made, failed): (Vec<_>, Vec<_>) = results.into_iter().partition(Result::is_ok);
-    let mut errors = failed.into_iter().filter_map(Result::err);
-    match errors.next() {
-        None => Ok(made.into_iter().flatten().collect()),
-        Some(first) => {
-            let others: Vec<String> = errors.map(|error| format!("{error:#}")).collect();
-            Err(if others.is_empty() {
-                first
-            } else {
-                first.context(others.join("; "))
-            })
-        }
-    }
-}
-
 /// Records, and keeps the recording beside the results made from it.
-fn recording(
+pub(crate) fn recording(
     scenario: &Scenario,
     vehicle: &VehicleParameters,
     seed: u64,
@@ -228,7 +159,7 @@ fn scenario_with_vehicle(
     Ok((scenario, vehicle))
 }
 
-fn load_vehicle(name_or_path: &str) -> Result<VehicleParameters> {
+pub(crate) fn load_vehicle(name_or_path: &str) -> Result<VehicleParameters> {
     crate::vehicles_command::load(name_or_path)
 }
 

@@ -34,6 +34,8 @@ pub struct Run<'a> {
     pub speed_reference_kmh: f64,
     /// Seed of the sensors' random numbers.
     pub seed: u64,
+    /// Target speed where no controller decides, km/h.
+    pub fixed_target_speed_kmh: f64,
     /// The controller; `None` leaves the driver alone.
     pub controller: Option<Box<dyn Controller>>,
 }
@@ -46,14 +48,14 @@ pub struct Finished {
     pub rows: Vec<LogRow>,
 }
 
-/// Runs to the end of the scenario, or to the rollover, writing every step to `log`.
+/// Runs to the end of the scenario, or to the rollover, writing every step to `log`, if there is one.
 ///
 /// # Errors
 /// When the simulation or the disk fails, or as [`Interrupted`] when the user stops it; the log
 /// then holds every step taken.
 pub fn run(
     mut run: Run<'_>,
-    log: &Path,
+    log: Option<&Path>,
     interrupt: &Interrupt,
     mut progress: impl FnMut(),
 ) -> Result<Finished> {
@@ -65,28 +67,27 @@ pub fn run(
         run.speed_reference_kmh,
         (run.seed, "run"),
     )?;
-    let mut writer = LogWriter::create(log)?;
+    let mut writer = log.map(LogWriter::create).transpose()?;
     let mut rows = Vec::with_capacity(run.scenario.steps());
     let mut reference = run.controller.as_ref().map(|c| c.new_reference());
     while rows.len() < run.scenario.steps() && !plant.ended() {
         if interrupt.is_raised() {
-            writer.finish()?;
+            finish(writer)?;
             return Err(interrupted(rows.len(), run.scenario, log).into());
         }
         let wanted = [plant.driver_steering_deg(), run.speed_reference_kmh];
         let decision = match (run.controller.as_deref_mut(), reference.as_mut()) {
             (Some(controller), Some(reference)) => decide(controller, reference, &wanted)?,
-            _ => Decision::passthrough(wanted),
+            _ => Decision::passthrough([wanted[0], run.fixed_target_speed_kmh]),
         };
         let mut output = [0.0];
         if let Err(error) = plant.step(&decision.input, &mut output) {
-            writer.finish()?;
+            finish(writer)?;
             return Err(error).with_context(|| {
                 format!(
-                    "the run stopped after {:.2} s; {} holds the {} steps before",
+                    "the run stopped after {:.2} s; {}",
                     rows.len() as f64 * run.scenario.sample_time_s,
-                    log.display(),
-                    rows.len()
+                    kept(rows.len(), log)
                 )
             });
         }
@@ -95,16 +96,17 @@ pub fn run(
             controller.observe(&decision.input, &[plant.measured_ltr()]);
         }
         let row = log_row(rows.len() + 1, &plant, &wanted, &decision, output[0]);
-        writer.append(&row)?;
+        if let Some(writer) = &mut writer {
+            writer.append(&row)?;
+        }
         rows.push(row);
         progress();
     }
-    writer.finish()?;
+    finish(writer)?;
     if let Some(time_s) = plant.not_finite_s() {
         bail!(
-            "the vehicle's state is not finite at {time_s:.2} s; {} holds the {} steps up to there",
-            log.display(),
-            rows.len()
+            "the vehicle's state is not finite at {time_s:.2} s; {}",
+            kept(rows.len(), log)
         );
     }
     Ok(Finished {
@@ -113,14 +115,25 @@ pub fn run(
     })
 }
 
-fn interrupted(steps: usize, scenario: &Scenario, log: &Path) -> Interrupted {
+fn finish(writer: Option<LogWriter>) -> Result<()> {
+    writer.map_or(Ok(()), LogWriter::finish)
+}
+
+fn kept(steps: usize, log: Option<&Path>) -> String {
+    match log {
+        Some(log) => format!("{} holds the {steps} steps taken", log.display()),
+        None => "it is run again the next time".into(),
+    }
+}
+
+fn interrupted(steps: usize, scenario: &Scenario, log: Option<&Path>) -> Interrupted {
     Interrupted {
         after: format!(
             "after {:.2} s of {} s",
             steps as f64 * scenario.sample_time_s,
             scenario.duration_s
         ),
-        kept: format!("{} holds the {steps} steps taken", log.display()),
+        kept: kept(steps, log),
     }
 }
 
@@ -206,6 +219,7 @@ fn log_row(
         roll_deg: seen.roll_rad.to_degrees(),
         speed_kmh: seen.speed_m_s * 3.6,
         path_deviation_m: plant.location().lateral_offset_m,
+        station_m: Some(plant.location().station_m),
         x_m: seen.x_m,
         y_m: seen.y_m,
         yaw_deg: seen.yaw_rad.to_degrees(),

@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use vehicle_dyn::metrics::Outcome;
 
+use super::campaign::Campaign;
+use super::claims;
 use super::data::{Limits, Problem, Provenance, Report, Role, Run, Scene};
 use super::log::{self, Renamed, TIME};
 use super::measures::{add_derived, outcome, run_figures, seed_rows};
@@ -14,6 +16,9 @@ use crate::summary::LTR_LIFT_OFF;
 
 /// Name of the logs that are looked for in a folder.
 pub const LOG_FILE: &str = "log.csv";
+
+/// Name of the file with a run's numbers, beside its log.
+pub const SUMMARY_FILE: &str = "summary.json";
 
 /// The part of `summary.json` that helps; more may be there, and all of it may be missing.
 #[derive(Debug, Default, Deserialize)]
@@ -39,8 +44,17 @@ pub fn collect(paths: &[PathBuf], renamed: &Renamed) -> Report {
         ..Report::default()
     };
     let mut logs = Vec::new();
+    let mut campaigns = Vec::new();
     for path in paths {
-        find_logs(path, &mut logs, &mut report.problems);
+        match Campaign::read(path, &mut report.problems) {
+            Some(campaign) => {
+                let of_run = campaign.file.runs.iter();
+                let of_run = of_run.map(|run| path.join(run).join(LOG_FILE));
+                logs.extend(of_run.filter(|log| log.is_file()));
+                campaigns.push(campaign);
+            }
+            None => find_logs(path, &mut logs, &mut report.problems),
+        }
     }
     logs.dedup();
     for log in &logs {
@@ -74,7 +88,30 @@ pub fn collect(paths: &[PathBuf], renamed: &Renamed) -> Report {
     if let [scene] = report.scenes.as_slice() {
         report.title.clone_from(&scene.title);
     }
+    if let [campaign] = campaigns.as_slice() {
+        add_campaign(&mut report, campaign);
+    }
     report
+}
+
+/// What a campaign adds to the logs of its runs.
+fn add_campaign(report: &mut Report, campaign: &Campaign) {
+    report.title = "Rollover prevention from data: the paper, reproduced".into();
+    report.asked = claims::QUESTION.map(str::to_owned).to_vec();
+    report.claims = claims::judge(campaign);
+    report.timing = campaign.timing_rows();
+    report.seeds = campaign.seed_rows(&report.scenes);
+    report.notes.insert(0, claims::RULE.into());
+    if let Some(table) = &campaign.timing {
+        report
+            .notes
+            .push(format!("{}.", table.deepc_equals_rd_deepc));
+    }
+    for failure in &campaign.failures {
+        report.notes.push(failure.to_string());
+    }
+    report.provenance.seeds.clone_from(&campaign.file.seeds);
+    report.provenance.command.clone_from(&campaign.file.command);
 }
 
 /// Where this program runs.
@@ -153,7 +190,7 @@ fn add_log(report: &mut Report, path: &Path, renamed: &Renamed) {
         return;
     }
     let folder = path.parent().unwrap_or(Path::new("."));
-    let summary = read_summary(&folder.join("summary.json"), &mut report.problems);
+    let summary = read_summary(&folder.join(SUMMARY_FILE), &mut report.problems);
     let SceneFile {
         scene,
         mut run,
@@ -200,7 +237,10 @@ fn read_summary(path: &Path, problems: &mut Vec<Problem>) -> Option<KnownSummary
 }
 
 /// Reads a file that may be missing.
-fn read_json<T: for<'de> Deserialize<'de>>(path: &Path, problems: &mut Vec<Problem>) -> Option<T> {
+pub(super) fn read_json<T: for<'de> Deserialize<'de>>(
+    path: &Path,
+    problems: &mut Vec<Problem>,
+) -> Option<T> {
     let text = std::fs::read(path).ok()?;
     match serde_json::from_slice(&text) {
         Ok(value) => Some(value),

@@ -55,7 +55,9 @@ pub fn command(args: &ReportArgs) -> Result<()> {
             .iter()
             .map(|(ours, theirs)| format!("--column {ours}={theirs}")),
     );
-    report.provenance.command = words.join(" ");
+    if report.provenance.command.is_empty() {
+        report.provenance.command = words.join(" ");
+    }
     if let Some(title) = &args.title {
         report.title.clone_from(title);
     }

@@ -123,7 +123,7 @@ pub struct TimingRow {
     pub cost: Option<f64>,
     /// Time of a step here, s.
     pub time_s: Option<f64>,
-    /// Time over that of the first row, in the same run.
+    /// Time over that of RD-DeePC as written, in the same run.
     pub ratio: Option<f64>,
     /// How it was measured.
     pub note: String,

@@ -16,7 +16,7 @@ pub const TIME: &str = "time_s";
 pub const STATUS: &str = "solve_status";
 /// Columns that a log may have, in the order in which this program writes them. All but [`TIME`]
 /// may be missing.
-pub const COLUMN_NAMES: [&str; 27] = [
+pub const COLUMN_NAMES: [&str; 28] = [
     TIME,
     "steering_wheel_deg",
     "target_speed_kmh",
@@ -36,6 +36,7 @@ pub const COLUMN_NAMES: [&str; 27] = [
     "roll_deg",
     "speed_kmh",
     "path_deviation_m",
+    "station_m",
     "x_m",
     "y_m",
     "yaw_deg",

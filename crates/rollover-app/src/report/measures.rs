@@ -128,47 +128,66 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
     values.get(values.len().saturating_sub(1) / 2).copied()
 }
 
+/// A run that counts in a row over the seeds.
+pub(super) struct SeedRun {
+    /// [`Scene::title`].
+    pub(super) scene: String,
+    pub(super) controller: String,
+    pub(super) mirrored: bool,
+    /// Whether it was completed, where that is known.
+    pub(super) completed: Option<bool>,
+    pub(super) figures: RunFigures,
+}
+
 /// Outcomes over the seeds of every scene in which a controller ran more than once.
 #[must_use]
 pub fn seed_rows(scenes: &[Scene]) -> Vec<SeedRow> {
-    let mut rows: Vec<SeedRow> = Vec::new();
-    for scene in scenes {
-        let mut groups: Vec<(&str, bool)> = Vec::new();
-        for run in &scene.runs {
-            let group = (run.controller.as_str(), run.mirrored);
-            if !groups.contains(&group) {
-                groups.push(group);
-            }
-        }
-        let rows_before = rows.len();
-        for &(controller, mirrored) in &groups {
-            rows.push(seed_row(scene, controller, mirrored));
-        }
-        if rows[rows_before..].iter().all(|row| row.runs < 2) {
-            rows.truncate(rows_before);
-        }
-    }
-    rows
+    let runs = scenes.iter().flat_map(|scene| {
+        scene.runs.iter().map(|run| SeedRun {
+            scene: scene.title.clone(),
+            controller: run.controller.clone(),
+            mirrored: run.mirrored,
+            completed: run.outcome.map(|outcome| outcome == Outcome::Completed),
+            figures: run.figures.clone(),
+        })
+    });
+    rows_of(&runs.collect::<Vec<_>>())
 }
 
-fn seed_row(scene: &Scene, controller: &str, mirrored: bool) -> SeedRow {
-    let of_group =
-        |run: &&super::data::Run| run.controller == controller && run.mirrored == mirrored;
-    let runs: Vec<_> = scene.runs.iter().filter(of_group).collect();
+/// A row for every scene, controller and course, in the order of the runs; none for scenes in which
+/// everything ran once.
+pub(super) fn rows_of(runs: &[SeedRun]) -> Vec<SeedRow> {
+    let mut groups: Vec<(&str, &str, bool)> = Vec::new();
+    for run in runs {
+        let group = (run.scene.as_str(), run.controller.as_str(), run.mirrored);
+        if !groups.contains(&group) {
+            groups.push(group);
+        }
+    }
+    let rows = groups.into_iter().map(|group| seed_row(runs, group));
+    let rows: Vec<SeedRow> = rows.collect();
+    let several = |scene: &str| rows.iter().any(|r| r.scene == scene && r.runs > 1);
+    rows.iter().filter(|r| several(&r.scene)).cloned().collect()
+}
+
+fn seed_row(runs: &[SeedRun], (scene, controller, mirrored): (&str, &str, bool)) -> SeedRow {
+    let of_group = |run: &&SeedRun| {
+        run.scene == scene && run.controller == controller && run.mirrored == mirrored
+    };
+    let runs: Vec<_> = runs.iter().filter(of_group).collect();
     let values = |f: fn(&RunFigures) -> Option<f64>| -> Vec<f64> {
         runs.iter().filter_map(|run| f(&run.figures)).collect()
     };
-    let judged = runs.iter().filter(|r| r.outcome.is_some()).count();
-    let safe = runs
-        .iter()
-        .filter(|r| r.outcome == Some(Outcome::Completed))
-        .count();
+    let judged = runs.iter().filter_map(|run| run.completed);
+    let (judged, safe) = judged.fold((0, 0), |(all, safe), completed| {
+        (all + 1, safe + i32::from(completed))
+    });
     SeedRow {
-        scene: scene.title.clone(),
+        scene: scene.to_owned(),
         controller: controller.to_owned(),
         course: if mirrored { "mirrored" } else { "as it is" }.into(),
         runs: runs.len(),
-        safe_fraction: (judged > 0).then(|| safe as f64 / judged as f64),
+        safe_fraction: (judged > 0).then(|| f64::from(safe) / f64::from(judged)),
         ltr_abs_median: median(values(|f| f.ltr_abs_max)),
         ltr_abs_worst: values(|f| f.ltr_abs_max).into_iter().reduce(f64::max),
         speed_mean_median_kmh: median(values(|f| f.speed_mean_kmh)),

@@ -7,7 +7,9 @@
 //! A campaign adds claims and timing to the [`data::Report`] that [`collect()`] makes of its folder, and
 //! calls [`write()`].
 
+mod campaign;
 pub(crate) mod chart;
+pub mod claims;
 mod collect;
 mod command;
 pub mod data;
@@ -23,8 +25,9 @@ mod scene_file;
 mod table;
 mod tables;
 
+pub use campaign::{CAMPAIGN_FILE, Campaign, CampaignFile, FAILURE_FILE, Failure, TIMING_FILE};
 pub(crate) use chart::{FONT, GRID, INK, tick};
-pub use collect::{LOG_FILE, collect, has_runs};
+pub use collect::{LOG_FILE, SUMMARY_FILE, collect, has_runs};
 pub use command::command;
 pub use figures::{FIGURE_ENDS, Figure, figures};
 pub use html::html;

@@ -32,11 +32,8 @@ pub(super) fn cells(run: &Summary) -> Vec<String> {
         format!("{:.1}", run.speed_min_kmh),
         format!("{:.1}", run.speed_mean_kmh),
         format!("{:.2}", run.path_deviation_max_m),
-        if run.cost == 0.0 {
-            "0".into()
-        } else {
-            format!("{:.3e}", run.cost)
-        },
+        run.cost
+            .map_or_else(|| "–".into(), |cost| format!("{cost:.3e}")),
     ]
 }
 

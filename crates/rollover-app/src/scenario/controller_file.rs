@@ -103,8 +103,10 @@ pub(super) fn controllers<'de, D: Deserializer<'de>>(
     deserializer: D,
 ) -> Result<BTreeMap<String, ControllerSettings>, D::Error> {
     let entries = BTreeMap::<String, ControllerEntry>::deserialize(deserializer)?;
-    entries
-        .keys()
+    // What others are like comes first: a mistake in it is told of where it was made.
+    let (like, own): (Vec<_>, Vec<_>) = entries.keys().partition(|&n| entries[n].like.is_some());
+    own.into_iter()
+        .chain(like)
         .map(|name| {
             let settings = resolved(name, &entries).and_then(ControllerSettings::try_from);
             let wrong = |error| D::Error::custom(format!("in controllers.{name}: {error}"));

@@ -310,11 +310,11 @@ impl Check<'_> {
 
     fn controller(&self, name: &str, c: &ControllerSettings) -> Result<(), ScenarioError> {
         let field = |key: &str| format!("controllers.{name}.{key}");
-        if name == super::DRIVER {
+        if [super::DRIVER, super::FLOOR].contains(&name) {
             return Err(self.out_of_range(
                 &format!("controllers.{name}"),
                 "a controller".into(),
-                "another name: `driver` is the driver alone in every scenario",
+                "another name: every scenario has a `driver`, alone, and a `floor`, held at the lowest target speed",
             ));
         }
         self.name("controllers", name)?;

@@ -24,6 +24,10 @@ use crate::toml_place::suggested;
 /// Name of the controller that every scenario has: the driver alone.
 pub const DRIVER: &str = "driver";
 
+/// Name of the policy that every scenario has beside it: the driver, held at the lowest target speed
+/// allowed. A controller that is slower is worth nothing.
+pub const FLOOR: &str = "floor";
+
 /// The channel that controllers are given.
 pub const CONTROLLER_CHANNEL: Channel = Channel::LoadTransferRatio;
 
@@ -67,7 +71,7 @@ pub struct Scenario {
     pub bounds: InputBounds,
     /// How the controllers' data are recorded.
     pub recording: RecordingRecipe,
-    /// Controllers by name. [`DRIVER`] is always there and is not listed.
+    /// Controllers by name. [`DRIVER`] and [`FLOOR`] are always there and are not listed.
     #[serde(deserialize_with = "controller_file::controllers")]
     pub controllers: BTreeMap<String, ControllerSettings>,
 }
@@ -104,17 +108,18 @@ impl Scenario {
     /// Names of all controllers, the driver first.
     #[must_use]
     pub fn controller_names(&self) -> Vec<&str> {
-        std::iter::once(DRIVER)
+        [DRIVER, FLOOR]
+            .into_iter()
             .chain(self.controllers.keys().map(String::as_str))
             .collect()
     }
 
-    /// The settings of a controller, or `None` for the driver alone.
+    /// The settings of a controller, or `None` for [`DRIVER`] and [`FLOOR`].
     ///
     /// # Errors
     /// When the scenario has no controller of that name.
     pub fn controller(&self, name: &str) -> Result<Option<&ControllerSettings>, ScenarioError> {
-        if name == DRIVER {
+        if [DRIVER, FLOOR].contains(&name) {
             return Ok(None);
         }
         self.controllers
@@ -126,6 +131,28 @@ impl Scenario {
                 suggestion: suggested(name, self.controller_names()),
                 known: self.controller_names().join(", "),
             })
+    }
+
+    /// Target speed where no controller decides: the lowest allowed for [`FLOOR`], else the
+    /// reference, km/h.
+    #[must_use]
+    pub fn fixed_target_speed_kmh(&self, name: &str, speed_reference_kmh: f64) -> f64 {
+        if name == FLOOR {
+            self.bounds.target_speed_kmh[0]
+        } else {
+            speed_reference_kmh
+        }
+    }
+
+    /// The scenario on the mirror image of its course and ground. The recording is what it was: a
+    /// controller must not depend on which way the recorded turns went.
+    #[must_use]
+    pub fn mirrored(&self) -> Self {
+        let mut mirrored = self.clone();
+        mirrored.recording.ground = Some(self.recording_ground().clone());
+        mirrored.course = self.course.mirrored();
+        mirrored.ground = self.ground.mirrored();
+        mirrored
     }
 
     /// The ground under the recording's course.

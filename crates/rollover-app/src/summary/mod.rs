@@ -1,11 +1,13 @@
 //! What a run comes to: the numbers of `summary.json`, computed from its log alone.
 
+mod course;
 mod model;
 
 use serde::{Deserialize, Serialize};
 use vehicle_dyn::metrics::{Outcome, RunMeasures, RunSample};
 
 use crate::run_log::{LogRow, SolveStatus};
+pub use course::{CourseMeasures, SPEED_RECOVERED_KMH};
 pub use model::{EffectSummary, ModelSummary};
 
 /// The summary of one run.
@@ -19,10 +21,17 @@ pub struct Summary {
     pub controller: String,
     /// Seed of the recording the controller works from.
     pub seed: u64,
+    /// Whether the course was driven as its mirror image.
+    #[serde(default)]
+    pub mirrored: bool,
     /// File of the recording, where it was given and not made from the seed.
     pub recording: Option<String>,
     /// Speed at the start and reference afterwards, km/h.
     pub speed_reference_kmh: f64,
+    /// Lowest and highest target speed that the controller might command, km/h; absent for the
+    /// driver alone.
+    #[serde(default)]
+    pub target_speed_bounds_kmh: Option<[f64; 2]>,
     /// How the run ended.
     pub outcome: Outcome,
     /// Time at which the outcome was decided, s.
@@ -47,8 +56,9 @@ pub struct Summary {
     pub steering_correction_max_deg: f64,
     /// Mean magnitude of that change, deg.
     pub steering_correction_mean_deg: f64,
-    /// Stage costs of the inputs summed over the run (paper, Table I; deg² and km²/h²).
-    pub cost: f64,
+    /// Stage costs of the inputs summed over the run (paper, Table I; deg² and km²/h²); absent
+    /// without weights: the driver alone has none.
+    pub cost: Option<f64>,
     /// Control steps taken.
     pub steps: usize,
     /// Steps in which the unconstrained optimum was feasible and no solver ran.
@@ -63,6 +73,9 @@ pub struct Summary {
     /// Rollover measures of the true motion, in SI units.
     #[serde(default)]
     pub measures: RunMeasures,
+    /// In which turn what happened.
+    #[serde(default)]
+    pub course: CourseMeasures,
     /// Wall-clock time of a step, µs.
     pub step_time_us: StepTime,
     /// The identified model it predicts with, if it does.
@@ -81,7 +94,7 @@ pub struct StepTime {
 }
 
 /// Who ran what: the part of a summary that the log does not hold.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct RunIdentity {
     /// Name of the scenario.
     pub scenario: String,
@@ -91,10 +104,16 @@ pub struct RunIdentity {
     pub controller: String,
     /// Seed of the recording.
     pub seed: u64,
+    /// Whether the course was driven as its mirror image.
+    pub mirrored: bool,
+    /// Stations at which each turn of the course begins and ends, m.
+    pub turns_m: Vec<[f64; 2]>,
     /// File of the recording, where it was given and not made from the seed.
     pub recording: Option<String>,
     /// Speed at the start and reference afterwards, km/h.
     pub speed_reference_kmh: f64,
+    /// Lowest and highest target speed that the controller might command, km/h, if it commands any.
+    pub target_speed_bounds_kmh: Option<[f64; 2]>,
     /// The identified model of the controller, if it has one.
     pub model: Option<ModelSummary>,
 }
@@ -124,8 +143,7 @@ impl InputWeights {
 pub const LTR_LIFT_OFF: f64 = 1.0;
 
 impl Summary {
-    /// Computes the summary of a log. Without `weights` (the driver alone tracks himself) the
-    /// cost is 0.
+    /// Computes the summary of a log; without `weights` it has no cost.
     #[must_use]
     pub fn of_log(
         identity: RunIdentity,
@@ -145,8 +163,10 @@ impl Summary {
             vehicle: identity.vehicle,
             controller: identity.controller,
             seed: identity.seed,
+            mirrored: identity.mirrored,
             recording: identity.recording,
             speed_reference_kmh: identity.speed_reference_kmh,
+            target_speed_bounds_kmh: identity.target_speed_bounds_kmh,
             outcome,
             end_time_s: rows.last().map_or(0.0, |r| r.time_s),
             ltr_abs_max: max_of(|r| r.ltr.abs()),
@@ -159,13 +179,14 @@ impl Summary {
             path_deviation_max_m: max_of(|r| r.path_deviation_m.abs()),
             steering_correction_max_deg: max_of(correction),
             steering_correction_mean_deg: mean_of(correction),
-            cost: weights.map_or(0.0, |w| rows.iter().map(|r| w.stage_cost(r)).sum()),
+            cost: weights.map(|w| rows.iter().map(|r| w.stage_cost(r)).sum()),
             steps: rows.len(),
             unconstrained_steps: count(|s| s == SolveStatus::Unconstrained),
             solver_steps: count(|s| matches!(s, SolveStatus::Solved | SolveStatus::SolvedBySecond)),
             fallback_steps: count(SolveStatus::is_fallback),
             ltr_lost_steps: lost_steps(rows),
             measures: RunMeasures::of(sample_time_s, rows.iter().map(sample)),
+            course: CourseMeasures::of(rows, &identity.turns_m, weights),
             step_time_us: StepTime::of(rows.iter().map(|r| r.step_time_us)),
             model: identity.model,
         }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::moments::input;
 use super::written::AtMoments;
@@ -16,7 +16,7 @@ pub const INPUTS_AGREE: f64 = 1e-6;
 pub const COSTS_AGREE: f64 = 5e-7;
 
 /// How far apart `DeePC` and RD-DeePC are.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Agreement {
     /// Steps of the two runs that were compared; 0 where one was not made.
     pub steps: usize,
@@ -35,7 +35,7 @@ pub struct Agreement {
 }
 
 /// How far apart the programs as written are at the moments.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct WrittenAgreement {
     /// Moments compared.
     pub moments: usize,

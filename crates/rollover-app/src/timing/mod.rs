@@ -15,7 +15,7 @@ mod written;
 
 use std::fmt;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::closed_loop::Recorded;
 use crate::interrupt::Interrupt;
@@ -70,7 +70,7 @@ pub struct Follow<'a> {
 }
 
 /// The table, and whether its first two rows are the same controller.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TimingTable {
     /// One row per method and form; those of the paper first.
     pub rows: Vec<TimingRow>,
@@ -81,7 +81,7 @@ pub struct TimingTable {
 }
 
 /// One method in one form.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TimingRow {
     /// The method.
     pub method: TimedMethod,
@@ -123,7 +123,7 @@ pub struct TimingRow {
 }
 
 /// A method of the paper's table.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TimedMethod {
     /// `DeePC` on the whole data matrix (paper eq. 16).
@@ -135,7 +135,7 @@ pub enum TimedMethod {
 }
 
 /// The form in which a method is solved.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TimedForm {
     /// With all its variables g, u, y and σ, by the interior-point solver.

@@ -198,7 +198,7 @@ fn what_is_wrong_with_a_scenario_has_a_place() {
             "ltr_limit = 0.92",
             "ltr_limit = 9.2",
             "ltr_limit = 9.2",
-            "controllers.lmpc.ltr_limit",
+            "controllers.lmpc-1.ltr_limit",
         ),
         (
             "friction = 0.85",

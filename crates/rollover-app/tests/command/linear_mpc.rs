@@ -34,10 +34,10 @@ fn a_field_of_another_method_is_named_with_its_controller() {
         ),
     ] {
         let with = format!("past_steps = 100\n{field} = {value}");
-        let message = fail_with_controller("lmpc", "past_steps = 100", &with);
+        let message = fail_with_controller("lmpc-1", "past_steps = 100", &with);
         let names = [
             "mine.toml",
-            "[controllers.lmpc]",
+            "[controllers.lmpc-1]",
             "line",
             &format!("`{field}`"),
             "method = \"lmpc\"",
@@ -72,19 +72,19 @@ fn a_missing_field_is_named_with_the_method_that_needs_it() {
         "\"rd-deepc\"",
     ];
     assert_says(&message, &names);
-    let message = fail_with_controller("lmpc", "method = \"lmpc\"", "method = \"pid\"");
+    let message = fail_with_controller("lmpc-1", "method = \"lmpc\"", "method = \"pid\"");
     assert_says(&message, &["mine.toml", "`pid`", "rd-deepc", "lmpc"]);
 }
 
 #[test]
 fn settings_of_an_identification_are_checked_on_loading() {
-    let controller = "lmpc-order-4";
+    let controller = "lmpc-1-paper";
     let message = fail_with_controller(controller, "order = 4", "order = 0");
     assert_says(
         &message,
         &[
             "mine.toml",
-            "controllers.lmpc-order-4.identification.order",
+            "controllers.lmpc-1-paper.identification.order",
             "0",
             "at least 1",
         ],
@@ -93,7 +93,7 @@ fn settings_of_an_identification_are_checked_on_loading() {
     assert_says(
         &message,
         &[
-            "controllers.lmpc-order-4.identification.without_effect",
+            "controllers.lmpc-1-paper.identification.without_effect",
             "`speed`",
             "`target_speed_kmh`",
         ],
@@ -114,7 +114,7 @@ fn a_run_is_reproducible_and_says_what_the_data_do_not_identify() {
             "run",
             "sedan-s1",
             "--controller",
-            "lmpc",
+            "lmpc-1",
             "--seed",
             "10",
             "--out",
@@ -143,7 +143,7 @@ fn a_run_is_reproducible_and_says_what_the_data_do_not_identify() {
     assert_says(
         &printed,
         &[
-            "lmpc: model of order",
+            "lmpc-1: model of order",
             "target_speed_kmh → ltr not identified",
         ],
     );
@@ -165,7 +165,7 @@ fn a_constant_input_is_told_before_a_model_is_made() {
         "run",
         "sedan-s1",
         "--controller",
-        "lmpc",
+        "lmpc-1",
         "--recording",
         "recording.csv",
     ];

@@ -57,7 +57,7 @@ fn numbers_from_columns_are_those_of_the_summary() {
         seed: 1,
         recording: None,
         speed_reference_kmh: 105.0,
-        model: None,
+        ..RunIdentity::default()
     };
     let rows = run_log::read(&path).expect("the log is whole");
     let summary = Summary::of_log(identity, Outcome::Completed, &rows, Some(&weights), 0.01);
@@ -77,7 +77,7 @@ fn numbers_from_columns_are_those_of_the_summary() {
         found.steering_correction_max_deg,
         summary.steering_correction_max_deg,
     );
-    close(found.cost, summary.cost);
+    close(found.cost, summary.cost.expect("there are weights"));
     close(found.step_time_median_us, summary.step_time_us.median);
     close(found.end_time_s, summary.end_time_s);
     assert_eq!(found.steps, summary.steps);

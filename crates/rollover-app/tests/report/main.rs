@@ -190,6 +190,7 @@ fn log_row(step: u32) -> LogRow {
         roll_deg: 5.0 * lean,
         speed_kmh: 104.0 - k / 700.0,
         path_deviation_m: 0.3 * lean,
+        station_m: Some(0.29 * k),
         x_m: 0.29 * k,
         y_m: 3.0 * lean,
         yaw_deg: 2.0 * lean,

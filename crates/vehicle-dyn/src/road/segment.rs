@@ -193,6 +193,21 @@ impl CourseDescription {
         }
     }
 
+    /// Stations at which each turn begins and ends, its clothoids included, m, in driving order.
+    #[must_use]
+    pub fn turns_m(&self) -> Vec<[f64; 2]> {
+        let mut station_m = 0.0;
+        let mut turns = Vec::new();
+        for segment in &self.segments {
+            let begin_m = station_m;
+            station_m += segment.length_m();
+            if matches!(segment, Segment::Turn { .. }) {
+                turns.push([begin_m, station_m]);
+            }
+        }
+        turns
+    }
+
     /// Checks every number against its range.
     ///
     /// # Errors
