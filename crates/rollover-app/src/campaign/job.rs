@@ -32,7 +32,7 @@ pub(super) struct Job<'a> {
     pub(super) seed: u64,
     pub(super) speed_reference_kmh: f64,
     pub(super) recorded: Option<&'a Recorded<'a>>,
-    pub(super) recording: Option<&'a Path>,
+    pub(super) recording: &'a [PathBuf],
     pub(super) out: PathBuf,
 }
 
@@ -75,7 +75,13 @@ impl Job<'_> {
         if let Some(identification) = &identification {
             write_identification(&self.out, identification)?;
         }
-        let described = SceneFile::new(self.scenario, self.vehicle, self.controller, self.seed)?;
+        let described = SceneFile::new(
+            self.scenario,
+            self.vehicle,
+            self.controller,
+            self.seed,
+            Some(&self.terrain),
+        )?;
         write_whole(
             &self.out.join(SCENE_FILE),
             &(serde_json::to_string(&described)? + "\n"),
@@ -96,7 +102,10 @@ impl Job<'_> {
                 vehicle: self.vehicle.name.clone(),
                 controller: self.controller.to_owned(),
                 seed: self.seed,
-                recording: self.recording.map(|file| file.display().to_string()),
+                recording: (!self.recording.is_empty()).then(|| {
+                    let files = self.recording.iter().map(|file| file.display().to_string());
+                    files.collect::<Vec<_>>().join(", ")
+                }),
                 speed_reference_kmh: self.speed_reference_kmh,
                 model: identification.map(|i| ModelSummary::of_report(&i.report)),
             },

@@ -31,6 +31,9 @@ const PAPER_CONTROLLERS: [&str; 6] = [
     "lmpc-no-speed-effect",
 ];
 
+/// Name of the first record's file.
+const RECORDING: &str = "recording.csv";
+
 /// `paper`: every controller of the main job, a table and a report.
 ///
 /// # Errors
@@ -51,7 +54,7 @@ pub fn paper(args: &PaperArgs, interrupt: &Interrupt) -> Result<()> {
         seed: args.seed,
         speed_reference_kmh: scenario.speed_reference_kmh,
         recorded: (controller != DRIVER).then_some(&recorded),
-        recording: None,
+        recording: &[],
         out: args.out.join(controller),
     };
     let jobs: Vec<Job<'_>> = PAPER_CONTROLLERS.into_iter().map(job).collect();
@@ -104,10 +107,10 @@ pub fn single(args: &RunArgs, interrupt: &Interrupt) -> Result<()> {
         .clone()
         .unwrap_or_else(|| default_folder(&scenario).join(&args.controller));
     create_folder(&out)?;
-    let data = match (settings, &args.recording) {
+    let data = match (settings, args.recording.as_slice()) {
         (None, _) => None,
-        (Some(_), Some(file)) => Some(record::read(file, &scenario)?),
-        (Some(_), None) => Some(recording(&scenario, &vehicle, args.seed, &out, interrupt)?),
+        (Some(_), files @ [_, ..]) => Some(record::read(files, &scenario)?),
+        (Some(_), []) => Some(recording(&scenario, &vehicle, args.seed, &out, interrupt)?),
     };
     let recorded = data.as_ref().map(Recorded::new);
     let job = Job {
@@ -118,7 +121,11 @@ pub fn single(args: &RunArgs, interrupt: &Interrupt) -> Result<()> {
         seed: args.seed,
         speed_reference_kmh,
         recorded: recorded.as_ref(),
-        recording: args.recording.as_deref().filter(|_| recorded.is_some()),
+        recording: if recorded.is_some() {
+            &args.recording
+        } else {
+            &[]
+        },
         out,
     };
     let bar = step_bar(&scenario, &args.controller);
@@ -157,20 +164,25 @@ pub fn record_only(args: &RecordArgs, interrupt: &Interrupt) -> Result<()> {
         .unwrap_or_else(|| default_folder(&scenario));
     create_folder(&out)?;
     let (dataset, summary) = record(&scenario, &vehicle, args.seed, interrupt)?;
-    let path = out.join("recording.csv");
-    record::write(&path, &dataset)?;
+    let files = record::write(&out.join(RECORDING), &dataset)?;
     write_json(&out.join("recording.json"), &summary)?;
     if args.json {
-        print_json(&summary)
-    } else {
-        print_line(&format!(
-            "{}: {} samples, max |LTR| {:.3}, at most {:.2} m off the path",
-            path.display(),
-            summary.samples,
-            summary.ltr_abs_max,
-            summary.path_deviation_max_m
-        ))
+        return print_json(&summary);
     }
+    let line = |file: &Path, samples: usize, ltr: f64, deviation_m: f64| {
+        print_line(&format!(
+            "{}: {samples} samples, max |LTR| {ltr:.3}, at most {deviation_m:.2} m off the path",
+            file.display()
+        ))
+    };
+    let s = &summary;
+    if let ([file], []) = (files.as_slice(), s.records.as_slice()) {
+        return line(file, s.samples, s.ltr_abs_max, s.path_deviation_max_m);
+    }
+    for (file, r) in files.iter().zip(&s.records) {
+        line(file, r.samples, r.ltr_abs_max, r.path_deviation_max_m)?;
+    }
+    Ok(())
 }
 
 /// A line for every run that predicts with an identified model.
@@ -210,7 +222,7 @@ fn recording(
     interrupt: &Interrupt,
 ) -> Result<Dataset> {
     let (dataset, summary) = record(scenario, vehicle, seed, interrupt)?;
-    record::write(&out.join("recording.csv"), &dataset)?;
+    record::write(&out.join(RECORDING), &dataset)?;
     write_json(&out.join("recording.json"), &summary)?;
     Ok(dataset)
 }

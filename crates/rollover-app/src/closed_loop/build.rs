@@ -15,6 +15,7 @@ use sysid::lmpc::{self, LmpcSettings};
 use sysid::{Identification, StateSpace};
 
 use super::recorded::{Recorded, Watch};
+use crate::record::first_records;
 use crate::scenario::{
     ControllerSettings, DataMatrix, DataSettings, InputBounds, ModelSettings, Prediction, Scenario,
 };
@@ -44,7 +45,8 @@ pub fn controller(
             identification: None,
         },
         Prediction::Model(model) => {
-            let identification = recorded.identification(&model.identification, watch)?;
+            let identification =
+                recorded.identification(settings.records, &model.identification, watch)?;
             Built {
                 controller: linear_mpc(scenario, settings, model, &identification.model)?,
                 identification: Some(identification),
@@ -78,7 +80,8 @@ pub(crate) fn deepc_problem(
         past: settings.past_steps,
         future: settings.horizon_steps,
     };
-    let hankel = HankelMatrix::build(data, horizons).context("the recording cannot be used")?;
+    let data = first_records(data, settings.records)?;
+    let hankel = HankelMatrix::build(&data, horizons).context("the recording cannot be used")?;
     let exciting = hankel
         .require_persistently_exciting(by_data.order_bound)
         .context("the recording cannot be used")?;

@@ -8,6 +8,7 @@ use deepc_core::data::Dataset;
 use sysid::{Identification, IdentificationSettings, Progress, SysidError, identify_with};
 
 use crate::interrupt::{Interrupt, Interrupted};
+use crate::record::first_records;
 
 /// Follows work that takes seconds and may stop it.
 #[derive(Clone, Copy)]
@@ -19,11 +20,14 @@ pub struct Watch<'a> {
 }
 
 /// A recording, and the models identified from it so far: controllers with the same settings of the
-/// identification, on several threads too, share one model.
+/// identification and the same number of records, on several threads too, share one model.
 pub struct Recorded<'a> {
     data: &'a Dataset,
-    models: Mutex<Vec<(IdentificationSettings, Slot)>>,
+    models: Mutex<Vec<(Origin, Slot)>>,
 }
+
+/// What a model was made from: number of records, `None` for all, and settings.
+type Origin = (Option<usize>, IdentificationSettings);
 
 /// Held while its model is being made, so that whoever else wants it waits.
 type Slot = Arc<Mutex<Option<Arc<Identification>>>>;
@@ -44,33 +48,35 @@ impl<'a> Recorded<'a> {
         self.data
     }
 
-    /// The model that the recording gives with these settings.
+    /// The model that the first `records` records, or all of them, give with these settings.
     ///
     /// # Errors
-    /// When the recording does not give one; the message says what to record. As [`Interrupted`] when
+    /// When the recording has fewer records. When the recording does not give one; the message says what to record. As [`Interrupted`] when
     /// the user stops it.
     pub fn identification(
         &self,
+        records: Option<usize>,
         settings: &IdentificationSettings,
         watch: Watch<'_>,
     ) -> Result<Arc<Identification>> {
-        let slot = self.slot(settings);
+        let slot = self.slot(&(records, settings.clone()));
         let mut slot = slot.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(made) = slot.as_ref() {
             return Ok(Arc::clone(made));
         }
-        let made = Arc::new(identify(self.data, settings, watch)?);
+        let data = first_records(self.data, records)?;
+        let made = Arc::new(identify(&data, settings, watch)?);
         *slot = Some(Arc::clone(&made));
         Ok(made)
     }
 
-    fn slot(&self, settings: &IdentificationSettings) -> Slot {
+    fn slot(&self, origin: &Origin) -> Slot {
         let mut models = self.models.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, slot)) = models.iter().find(|(of, _)| of == settings) {
+        if let Some((_, slot)) = models.iter().find(|(of, _)| of == origin) {
             return Arc::clone(slot);
         }
         let slot = Slot::default();
-        models.push((settings.clone(), Arc::clone(&slot)));
+        models.push((origin.clone(), Arc::clone(&slot)));
         slot
     }
 }

@@ -19,7 +19,7 @@ pub struct Summary {
     pub controller: String,
     /// Seed of the recording the controller works from.
     pub seed: u64,
-    /// File of the recording, where it was given and not made from the seed.
+    /// Files of the recording, where they were given and not made from the seed.
     pub recording: Option<String>,
     /// Speed at the start and reference afterwards, km/h.
     pub speed_reference_kmh: f64,
@@ -91,7 +91,7 @@ pub struct RunIdentity {
     pub controller: String,
     /// Seed of the recording.
     pub seed: u64,
-    /// File of the recording, where it was given and not made from the seed.
+    /// Files of the recording, where they were given and not made from the seed.
     pub recording: Option<String>,
     /// Speed at the start and reference afterwards, km/h.
     pub speed_reference_kmh: f64,
