@@ -186,9 +186,10 @@ pub struct RunArgs {
     /// Vehicle file or name, instead of the scenario's.
     #[arg(long, value_name = "VEHICLE")]
     pub vehicle: Option<String>,
-    /// Recording to work from, instead of making one from the seed.
-    #[arg(long, value_name = "FILE")]
-    pub recording: Option<PathBuf>,
+    /// Recording to work from, instead of making one from the seed: a file for each record, separated
+    /// by commas or each with its own --recording.
+    #[arg(long, value_delimiter = ',', value_name = "FILE,…")]
+    pub recording: Vec<PathBuf>,
     /// Terrain file that `terrain` wrote, or map of measured heights (`.npz`, `.csv`), instead of the
     /// scenario's ground.
     #[arg(long, value_name = "FILE")]
@@ -232,7 +233,7 @@ pub struct RecordArgs {
     /// Seed of the noise on the inputs.
     #[arg(long, default_value_t = 10)]
     pub seed: u64,
-    /// Folder for `recording.csv`; by default `out/SCENARIO`.
+    /// Folder for `recording.csv`, and `recording-2.csv` and so on where there are more records; by default `out/SCENARIO`.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Vehicle file or name, instead of the scenario's.

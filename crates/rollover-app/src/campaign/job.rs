@@ -36,7 +36,7 @@ pub(crate) struct Job<'a> {
     pub(crate) mirrored: bool,
     pub(crate) speed_reference_kmh: f64,
     pub(crate) recorded: Option<&'a Recorded<'a>>,
-    pub(crate) recording: Option<&'a Path>,
+    pub(crate) recording: &'a [PathBuf],
     /// Whether its log is kept, and all that goes with a log; without, only the summary is.
     pub(crate) logged: bool,
     pub(crate) out: PathBuf,
@@ -108,7 +108,10 @@ impl Job<'_> {
                 seed: self.seed,
                 mirrored: self.mirrored,
                 turns_m: self.scenario.course.turns_m(),
-                recording: self.recording.map(|file| file.display().to_string()),
+                recording: (!self.recording.is_empty()).then(|| {
+                    let files = self.recording.iter().map(|file| file.display().to_string());
+                    files.collect::<Vec<_>>().join(", ")
+                }),
                 speed_reference_kmh: self.speed_reference_kmh,
                 target_speed_bounds_kmh: settings.map(|_| self.scenario.bounds.target_speed_kmh),
                 model: identification.map(|i| ModelSummary::of_report(&i.report)),
@@ -132,8 +135,13 @@ impl Job<'_> {
         if let Some(identification) = identification {
             write_identification(&self.out, identification)?;
         }
-        let mut described =
-            SceneFile::new(self.scenario, self.vehicle, self.controller, self.seed)?;
+        let mut described = SceneFile::new(
+            self.scenario,
+            self.vehicle,
+            self.controller,
+            self.seed,
+            Some(&self.terrain),
+        )?;
         described.run.mirrored = self.mirrored;
         write_whole(
             &self.out.join(SCENE_FILE),

@@ -22,6 +22,7 @@ mod output;
 mod pack;
 mod plots;
 mod scene_file;
+mod scene_ground;
 mod table;
 mod tables;
 

@@ -25,6 +25,8 @@ pub struct ControllerSettings {
     pub ltr_penalty: LtrPenalty,
     /// Weights R on the inputs' distance from their references.
     pub input_weights: InputWeights,
+    /// How many records of the recording it works from, the first ones; all of them if `None`.
+    pub records: Option<usize>,
     /// How it predicts.
     pub prediction: Prediction,
 }
