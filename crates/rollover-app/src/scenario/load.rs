@@ -17,10 +17,16 @@ use crate::record::INPUT_COLUMNS;
 use crate::toml_place::{Place, suggested};
 
 /// Scenarios that travel with the binary.
-const EMBEDDED: [(&str, &str); 1] = [(
-    "sedan-s1",
-    include_str!("../../../../scenarios/sedan-s1.toml"),
-)];
+const EMBEDDED: [(&str, &str); 2] = [
+    (
+        "sedan-s1",
+        include_str!("../../../../scenarios/sedan-s1.toml"),
+    ),
+    (
+        "truck-s2",
+        include_str!("../../../../scenarios/truck-s2.toml"),
+    ),
+];
 
 /// What can be wrong with a scenario.
 #[derive(Debug, Error)]
