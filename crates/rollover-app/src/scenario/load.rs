@@ -18,10 +18,14 @@ use crate::record::INPUT_COLUMNS;
 use crate::toml_place::{Place, suggested};
 
 /// Scenarios that travel with the binary.
-const EMBEDDED: [(&str, &str); 2] = [
+const EMBEDDED: [(&str, &str); 3] = [
     (
         "sedan-s1",
         include_str!("../../../../scenarios/sedan-s1.toml"),
+    ),
+    (
+        "truck-s2",
+        include_str!("../../../../scenarios/truck-s2.toml"),
     ),
     (
         "riverbed-s3",
