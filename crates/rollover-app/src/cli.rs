@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::Result;
-use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 
 use crate::output::print_text;
@@ -278,6 +278,9 @@ pub struct IdentifyArgs {
     /// Inputs whose effect is held at zero, because the data do not identify it.
     #[arg(long, value_delimiter = ',', value_name = "COLUMN,…")]
     pub without_effect: Vec<String>,
+    /// What is taken from the channels, so that the model is one of deviations.
+    #[arg(long, value_enum, default_value = "found", value_name = "HOW")]
+    pub offsets: Offsets,
     /// Recordings that judge the model; by default it is judged on those it was made from.
     #[arg(long, value_delimiter = ',', value_name = "RECORDING,…")]
     pub validate: Vec<PathBuf>,
@@ -290,6 +293,27 @@ pub struct IdentifyArgs {
     /// Print the report as JSON on standard output.
     #[arg(long)]
     pub json: bool,
+}
+
+/// What is taken from the channels before a model is made of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Offsets {
+    /// Means, and a constant per output that is estimated with the model.
+    Found,
+    /// Means, nothing else.
+    Means,
+    /// Nothing: the model goes through the origin.
+    None,
+}
+
+impl From<Offsets> for sysid::OffsetChoice {
+    fn from(offsets: Offsets) -> Self {
+        match offsets {
+            Offsets::Found => Self::Found,
+            Offsets::Means => Self::Means,
+            Offsets::None => Self::None,
+        }
+    }
 }
 
 /// Arguments of `manoeuvre`.

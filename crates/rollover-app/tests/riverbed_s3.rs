@@ -23,17 +23,15 @@ fn drive(speed_reference_kmh: f64, mirror: bool) -> Finished {
         scenario.ground = scenario.ground.mirrored();
     }
     let course = Course::new(&scenario.course).expect("the course is valid");
+    let terrain = Terrain::build(&scenario.ground, &course).expect("the ground fits the course");
     let order = Run {
-        scenario: &scenario,
-        vehicle: &vehicle,
-        terrain: Terrain::build(&scenario.ground, &course).expect("the ground fits the course"),
         speed_reference_kmh,
-        seed: 0,
-        controller: None,
+        fixed_target_speed_kmh: speed_reference_kmh,
+        ..Run::of_driver(&scenario, &vehicle, terrain)
     };
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
     let log = folder.path().join("log.csv");
-    run(order, &log, &Interrupt::default(), || ()).expect("the simulation runs")
+    run(order, Some(&log), &Interrupt::default(), || ()).expect("the simulation runs")
 }
 
 #[test]

@@ -8,14 +8,14 @@ use sysid::{Identification, Progress};
 use vehicle_dyn::parameters::VehicleParameters;
 use vehicle_dyn::terrain::Terrain;
 
-use crate::closed_loop::{self, Built, Recorded, Run, Watch};
+use crate::closed_loop::{self, Built, Recorded, Run, SteeringProfile, Watch};
 use crate::interrupt::Interrupt;
 use crate::output::{create_folder, write_json, write_whole};
 use crate::progress;
 use crate::report::{
     self, FAILURE_FILE, LOG_FILE, REPORT_FILE, SCENE_FILE, SUMMARY_FILE, SceneFile,
 };
-use crate::scenario::Scenario;
+use crate::scenario::{ReferenceAhead, Scenario};
 use crate::summary::{ModelSummary, RunIdentity, Summary};
 
 /// What tells that a run's results are those of the same program and settings.
@@ -86,7 +86,18 @@ impl Job<'_> {
         if self.logged {
             self.describe(identification.as_deref())?;
         }
+        let settings = self.scenario.controller(self.controller)?;
+        let preview = match settings.map(|s| s.reference) {
+            Some(ReferenceAhead::Preview) => Some(SteeringProfile::record(
+                self.scenario,
+                self.vehicle,
+                &self.terrain,
+                self.seed,
+            )?),
+            _ => None,
+        };
         let run = Run {
+            preview,
             scenario: self.scenario,
             vehicle: self.vehicle,
             terrain: self.terrain.clone(),
@@ -99,7 +110,6 @@ impl Job<'_> {
         };
         let to = self.logged.then_some(log.as_path());
         let finished = closed_loop::run(run, to, interrupt, || bar.inc(1))?;
-        let settings = self.scenario.controller(self.controller)?;
         let summary = Summary::of_log(
             RunIdentity {
                 scenario: self.scenario.name.clone(),

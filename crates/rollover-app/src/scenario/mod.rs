@@ -18,6 +18,7 @@ use vehicle_dyn::terrain::GroundDescription;
 
 pub use controllers::{
     ControllerSettings, DataMatrix, DataSettings, LtrPenalty, ModelSettings, Prediction,
+    ReferenceAhead,
 };
 pub use load::{ScenarioError, embedded_names, embedded_text, load};
 pub use recording::{FurtherRecord, RecordRecipe, RecordingRecipe};
