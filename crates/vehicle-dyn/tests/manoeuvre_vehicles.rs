@@ -15,7 +15,10 @@ const LIFTS_TWO_WHEELS: [(&str, &[&str]); 6] = [
     ("sedan", &["j-turn", "fishhook-1a", "fishhook-1b"]),
     ("sedan-unladen", &[]),
     ("utility-truck", &["fishhook-1a", "fishhook-1b"]),
-    ("utility-truck-laden", &["j-turn", "fishhook-1a", "fishhook-1b"]),
+    (
+        "utility-truck-laden",
+        &["j-turn", "fishhook-1a", "fishhook-1b"],
+    ),
     ("suv", &["j-turn", "fishhook-1a", "fishhook-1b"]),
     ("hmmwv", &[]),
 ];
