@@ -173,7 +173,7 @@ mod tests {
             let row = index((y - map.y_min_m) / map.spacing_m - 0.5);
             map.heights_m[row * map.columns + column]
         };
-        for station in 0..600_u32 {
+        for station in 0..590_u32 {
             let point = course().point(f64::from(station));
             let (found, under) = (
                 at(point.x_m, point.y_m),
