@@ -148,6 +148,9 @@ pub struct PaperArgs {
     /// Scenarios; by default all of the paper.
     #[arg(long, value_name = "SCENARIO,…", value_delimiter = ',', value_parser = paper_scenario)]
     pub only: Vec<String>,
+    /// Controllers; by default all of every scenario.
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
+    pub controllers: Vec<String>,
     /// Folder for the results.
     #[arg(long, default_value = "out/paper", value_name = "DIR")]
     pub out: PathBuf,

@@ -18,17 +18,13 @@ fn scenario() -> (Scenario, VehicleParameters) {
 /// The driver alone.
 fn drive(speed_reference_kmh: f64) -> Finished {
     let (scenario, vehicle) = scenario();
-    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let terrain = Terrain::flat(scenario.ground.friction);
     let order = Run {
-        scenario: &scenario,
-        vehicle: &vehicle,
-        terrain: Terrain::flat(scenario.ground.friction),
         speed_reference_kmh,
-        seed: 0,
-        controller: None,
+        fixed_target_speed_kmh: speed_reference_kmh,
+        ..Run::of_driver(&scenario, &vehicle, terrain)
     };
-    let log = folder.path().join("log.csv");
-    run(order, &log, &Interrupt::default(), || ()).expect("the simulation runs")
+    run(order, None, &Interrupt::default(), || ()).expect("the simulation runs")
 }
 
 #[test]
