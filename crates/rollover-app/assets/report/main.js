@@ -11,7 +11,11 @@ const PRINT_WIDTH = 660;
 function forPaper(on) {
   if (printing === on) return;
   printing = on;
-  if (on) for (const details of document.querySelectorAll("details")) details.open = true;
+  // Paper cannot be unfolded.
+  for (const details of document.querySelectorAll("details")) {
+    if (on) details.dataset.folded = String(!details.open);
+    details.open = on || details.dataset.folded !== "true";
+  }
   for (const scene of scenes) {
     for (const { u } of scene.plots) if (on) u.setSize({ width: PRINT_WIDTH, height: PLOT_HEIGHT - 20 });
     if (!on) scene.resize();

@@ -21,6 +21,10 @@ function el(tag, attributes = {}, ...children) {
   return node;
 }
 
+// Text in which backticks mark names.
+const prose = (text) => text.split("`").map((words, index, parts) =>
+  (index % 2 && index < parts.length - 1 ? el("code", {}, words) : index % 2 ? `\`${words}` : words));
+
 const NONE = "–";
 const known = (value) => typeof value === "number" && Number.isFinite(value);
 const fixed = (value, digits) => (known(value) ? value.toFixed(digits).replace(/^-(0(\.0*)?)$/, "$1") : NONE);

@@ -20,13 +20,17 @@ class Replay {
     this.time = scene.start;
     this.playing = false;
     this.rate = 1;
-    // The paper shows these two: data-driven control against control on a model, else the driver.
-    const first = (role) => scene.runs.find((run) => run.role === role);
-    this.first = first("deepc") ?? scene.runs[0];
-    const others = ["lmpc", "driver", "floor"].map(first).concat(scene.runs);
-    this.second = others.find((run) => run && run !== this.first) ?? null;
-    this.time = this.first.peakTime();
+    [this.first, this.second] = this.pairOf(scene.runs.filter((run) => run.shown));
+    this.time = (this.second ?? this.first).dangerTime(scene.limits.ltr ?? 1);
     this.build();
+  }
+
+  // The paper shows these two: data-driven control against control on a model, else the driver.
+  pairOf(runs) {
+    const first = (role) => runs.find((run) => run.role === role);
+    const one = first("deepc") ?? runs[0] ?? this.scene.runs[0];
+    const others = ["lmpc", "driver", "floor"].map(first).concat(runs, this.scene.runs);
+    return [one, others.find((run) => run && run !== one) ?? null];
   }
 
   // The vehicles shown, each with its letter.

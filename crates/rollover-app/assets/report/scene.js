@@ -56,6 +56,13 @@ class RunView {
     return this.ended_early && time >= this.end - 1e-9;
   }
 
+  // When a vehicle comes into danger: |LTR| at its limit for the first time, else at its largest.
+  dangerTime(limit) {
+    const values = this.column.ltr;
+    const first = values ? values.findIndex((v) => Math.abs(v) > limit) : -1;
+    return first < 0 ? this.peakTime() : Math.min(this.end, this.grid.start_s + first * this.grid.step_s);
+  }
+
   peakTime() {
     const values = this.column.ltr;
     if (!values) return this.grid.start_s;
@@ -80,7 +87,7 @@ class SceneView {
     this.box = bounds(this);
     this.plots = [];
     this.element = part(this.key, this.title,
-      this.description ? el("p", {}, this.description) : null);
+      this.description ? el("p", {}, prose(this.description)) : null);
     this.element.classList.add("scene");
     if (this.runs.length) this.build();
   }
@@ -94,7 +101,10 @@ class SceneView {
     this.toggles = this.runs.map((run) => el("button", {
       type: "button", class: "toggle", "aria-pressed": String(run.shown), title: run.description || undefined,
       onclick: () => this.toggle(run),
-    }, swatch(run.look), el("span", {}, run.label), outcomeBadge(run)));
+    }, swatch(run.look), el("span", {}, run.label)));
+    this.castButtons = this.casts.map((cast) => el("button", {
+      type: "button", class: "cast", onclick: () => this.showCast(cast),
+    }, cast.name));
     this.plotsBox = el("div", { class: "plots" });
     if (this.box) {
       this.course = el("canvas", { class: "course", role: "img", "aria-label": `The road from above: ${this.title}` });
@@ -107,10 +117,12 @@ class SceneView {
     this.element.append(
       runsTable(this),
       notes.length ? el("details", {}, el("summary", {}, "What the controllers are"),
-        el("dl", { class: "facts" }, notes.map((run) => [el("dt", {}, run.label), el("dd", {}, run.description)]))) : "",
-      el("div", { class: "toggles", role: "group", "aria-label": "Runs shown in the plots" }, this.toggles,
-        this.runs.length > 3 ? [el("button", { type: "button", onclick: () => this.showAll(true) }, "All"),
-          el("button", { type: "button", onclick: () => this.showAll(false) }, "None")] : null),
+        el("dl", { class: "facts" }, notes.map((run) => [el("dt", {}, run.label), el("dd", {}, prose(run.description))]))) : "",
+      this.runs.length > 3 ? el("div", { class: "casts", role: "group", "aria-label": "Choices of runs for the plots" },
+        el("span", { class: "soft" }, "Show"), this.castButtons,
+        el("button", { type: "button", onclick: () => this.showAll(true) }, "All"),
+        el("button", { type: "button", onclick: () => this.showAll(false) }, "None")) : "",
+      el("div", { class: "toggles", role: "group", "aria-label": "Runs shown in the plots" }, this.toggles),
       el("p", { class: "soft small-print hint" }, "Drag over a plot to zoom, double click to see all, click to move the replay. Press ? for keys."),
       el("div", { class: "stage" }, this.plotsBox, this.replay.element));
   }
@@ -185,6 +197,12 @@ class SceneView {
     this.replay.draw();
   }
 
+  // A comparison: its runs in the plots, its first two of a kind each in the replay.
+  showCast({ runs }) {
+    this.runs.forEach((run, index) => this.show(run, runs.includes(index)));
+    this.replay.choose(...this.replay.pairOf(runs.map((index) => this.runs[index])));
+  }
+
   showAll(shown) {
     for (const run of this.runs) this.show(run, shown);
     this.replay.draw();
@@ -256,6 +274,7 @@ function showRun(sceneName, label) {
   const run = scene?.runs.find((one) => one.label === label);
   if (!run) return;
   const { first, second } = scene.replay;
+  scene.show(run, true);
   scene.replay.choose(run, run === second ? first : second);
   scene.replay.goTo(run.peakTime());
   scrollTo(scene.element);

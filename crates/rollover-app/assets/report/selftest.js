@@ -27,6 +27,40 @@ function mouse(target, kind, x, y) {
 }
 const press = (key) => document.body.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true, cancelable: true }));
 
+// Claims: a row for each, that unfolds by keyboard and leads to its run.
+async function testClaims(check) {
+  const rows = [...document.querySelectorAll("#claims details.claim")];
+  const ids = report.claims.map((claim) => (claim.settings === "paper" ? claim.id.replace(/-paper$/, "") : claim.id));
+  check("claims are there", rows.length === new Set(ids).size);
+  check("claims say their verdicts", rows.every((row) => Object.keys(VERDICTS).some((verdict) => row.querySelector("summary").innerText.includes(verdict))));
+  check("claims are folded", rows.every((row) => !row.open));
+  for (const row of rows) {
+    const summary = row.querySelector("summary");
+    summary.focus();
+    check("claims have the focus", document.activeElement === summary);
+    // The browser makes a click of a key that the page leaves alone.
+    for (const key of [" ", "Enter"]) {
+      const event = new KeyboardEvent("keydown", { key, bubbles: true, cancelable: true });
+      check("claims have their keys", summary.dispatchEvent(event) && scenes.every((scene) => !scene.replay?.playing));
+    }
+    summary.click();
+    check("claims unfold", row.open && row.querySelector(".claim-more").clientHeight > 0);
+  }
+  for (const row of rows) row.open = false;
+  forPaper(true);
+  check("claims are unfolded on paper", rows.every((row) => row.open));
+  forPaper(false);
+  check("claims fold again", rows.every((row) => !row.open));
+  const linked = report.claims.find((claim) => claim.reason?.run);
+  const button = document.querySelector("#claims button.link");
+  if (linked && button) {
+    const scene = scenes.find(({ name }) => name === linked.reason.run.scene);
+    button.click();
+    check("a claim leads to its run", scene.replay.first.label === linked.reason.run.label && scene.replay.first.shown);
+  }
+  document.activeElement?.blur();
+}
+
 async function testScene(scene, check) {
   const name = (what) => `${scene.key}: ${what}`;
   const timed = scene.plots.filter((plot) => plot.lines.length);
@@ -63,9 +97,14 @@ async function testScene(scene, check) {
   scene.replay.goTo(scene.end);
   check(name("the end is shown"), scene.replay.clock.textContent === `${fixed(scene.end, 2)} s`);
   for (const run of scene.runs) scene.replay.choose(run, null);
+  scene.show(scene.runs[0], true);
   scene.toggles[0].click();
   check(name("a run can be hidden"), scene.runs[0].shown === false);
   scene.toggles[0].click();
+  scene.casts.forEach((cast, index) => {
+    scene.castButtons[index].click();
+    check(name(`${cast.name} are shown`), scene.runs.every((run, k) => run.shown === cast.runs.includes(k)));
+  });
   scene.element.scrollIntoView();
   scene.replay.goTo(scene.start);
   press("ArrowRight");
@@ -78,6 +117,9 @@ async function testScene(scene, check) {
 
 async function selftest() {
   const failed = [];
+  // What is seen before anything is touched.
+  const drawn = scenes.map((scene) => scene.runs.filter((run) => run.shown).map((run) => run.label));
+  const pairs = scenes.filter((scene) => scene.replay).map((scene) => scene.replay.pair().map(({ run }) => run.label));
   let checks = 0;
   const check = (what, holds) => {
     checks += 1;
@@ -86,6 +128,7 @@ async function selftest() {
   try {
     // Plots draw themselves after the page is put together.
     await wait(300);
+    await testClaims(check);
     for (const scene of scenes.filter((one) => one.replay)) await testScene(scene, check);
     press("?");
     check("? opens the help", document.getElementById("help").open);
@@ -106,7 +149,7 @@ async function selftest() {
     failed.push(String(error.stack ?? error));
   }
   const plots = scenes.reduce((sum, scene) => sum + scene.plots.length, 0);
-  const result = { ok: failed.length === 0 && failures.length === 0, checks, plots, failed, errors: failures };
+  const result = { ok: failed.length === 0 && failures.length === 0, checks, plots, drawn, pairs, failed, errors: failures };
   document.documentElement.dataset.selftest = JSON.stringify(result);
   // A test that shows the page in a narrow frame hears of it.
   if (parent !== window) parent.postMessage({ selftest: result }, "*");

@@ -13,36 +13,8 @@ function table(caption, columns, rows) {
 const part = (id, heading, ...children) =>
   el("section", { id, class: "part", "aria-labelledby": `${id}-title` }, el("h2", { id: `${id}-title` }, heading), ...children);
 
-const VERDICTS = {
-  reproduced: ["good", "✓"],
-  partly: ["fair", "~"],
-  "not reproduced": ["bad", "✕"],
-};
-
 function percent(fraction) {
   return known(fraction) ? `${Math.round(100 * fraction)} %` : NONE;
-}
-
-function claimsPart() {
-  if (!report.claims.length) return null;
-  const counts = Object.keys(VERDICTS).map((verdict) =>
-    [verdict, report.claims.filter((claim) => claim.verdict === verdict).length]);
-  const cards = report.claims.map((claim) => {
-    const [kind, sign] = VERDICTS[claim.verdict] ?? ["unknown", "?"];
-    const link = claim.reason?.run;
-    return el("li", { class: `claim ${kind}` },
-      el("div", { class: "claim-head" }, badge(kind, sign, claim.verdict),
-        el("span", { class: "soft" }, `${percent(claim.fraction)} of the judged runs, ${claim.seeds.length} seeds`)),
-      el("p", { class: "claim-text" }, claim.claim),
-      el("dl", {}, el("dt", {}, "Paper"), el("dd", {}, claim.paper), el("dt", {}, "Here"), el("dd", {}, claim.ours),
-        claim.reason ? [el("dt", {}, "Why"), el("dd", {}, claim.reason.text,
-          link ? [" ", el("button", { type: "button", class: "link", onclick: () => showRun(link.scene, link.label) },
-            `Show ${link.label}`)] : null)] : null));
-  });
-  return part("claims", "Claim by claim",
-    el("p", {}, counts.filter(([, n]) => n > 0).map(([verdict, n]) => `${n} ${verdict}`).join(", "),
-      ". A claim is reproduced if it holds in at least 80 % of the judged runs, partly in 20 to 80 %."),
-    el("ul", { class: "claims" }, cards));
 }
 
 function timingPart() {
@@ -62,9 +34,8 @@ function timingPart() {
 
 function seedsPart() {
   if (!report.seeds.length) return null;
-  return part("seeds", "Over the seeds", table("Outcomes over the recording seeds", [
+  const columns = [
     ["controller", (row) => row.controller, ""],
-    ["scene", (row) => row.scene, ""],
     ["course", (row) => row.course, ""],
     ["runs", (row) => String(row.runs), "number"],
     ["safe", (row) => percent(row.safe_fraction), "number"],
@@ -74,7 +45,13 @@ function seedsPart() {
     ["lowest km/h", (row) => fixed(row.speed_min_worst_kmh, 1), "number"],
     ["off path m", (row) => fixed(row.path_deviation_worst_m, 2), "number"],
     ["cost, median", (row) => short(row.cost_median), "number"],
-  ], report.seeds));
+  ];
+  // Several long tables would hide what comes below.
+  const names = [...new Set(report.seeds.map((row) => row.scene))];
+  return part("seeds", "Over the seeds", names.map((name) => {
+    const rows = table(`Outcomes over the recording seeds: ${name}`, columns, report.seeds.filter((row) => row.scene === name));
+    return names.length > 1 ? el("details", {}, el("summary", {}, name), rows) : rows;
+  }));
 }
 
 function runsTable(scene) {
@@ -123,7 +100,7 @@ function aboutPart() {
     ["Machine", from.machine],
   ].filter(([, value]) => value);
   return part("about", "About these numbers",
-    report.notes.map((note) => el("p", {}, note)),
+    report.notes.map((note) => el("p", {}, prose(note))),
     el("p", {}, "Tables are computed from every row of the logs. Plots and replay show fewer values (",
       rates.join("; "), "), 16 bits each: plots keep the smallest and the largest of what they leave out, the replay follows straight lines. Full data are in the logs, figures and tables for a paper beside this page."),
     el("dl", { class: "facts" }, facts.map(([name, value]) => [el("dt", {}, name), el("dd", {}, value)])));
@@ -137,8 +114,9 @@ function header() {
   const runs = report.scenes.reduce((sum, scene) => sum + scene.runs.length, 0);
   document.getElementById("top").append(
     el("h1", {}, report.title),
-    ...report.asked.map((text) => el("p", { class: "lead" }, text)),
-    el("p", { class: "soft" }, `${runs} run${runs === 1 ? "" : "s"}: ${words}.`),
+    ...report.asked.map((text) => el("p", { class: "lead" }, prose(text))),
+    el("p", { class: "soft" }, `${runs} run${runs === 1 ? "" : "s"} shown: ${words}.`,
+      report.unlogged_runs ? [` The verdicts count ${report.unlogged_runs} more, whose numbers are in `, el("code", {}, "tables/runs.csv"), "."] : null),
     report.problems.length ? el("p", { class: "notice" },
       `${report.problems.length} problem${report.problems.length === 1 ? "" : "s"} with files: `,
       el("a", { href: "#problems" }, "see which"), ".") : "");

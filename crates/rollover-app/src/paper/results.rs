@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::execute::Made;
 use crate::output::{print_line, table_text, write_json};
-use crate::report::data::{Claim, Report, Verdict};
+use crate::report::data::{Claim, Report, Settings, Verdict};
 use crate::report::{self, Campaign, Failure, REPORT_FILE, Written};
 use crate::summary::Summary;
 use crate::timing::{Agreement, TimingRow};
@@ -46,10 +46,16 @@ pub(super) struct Json<'a> {
 #[derive(Serialize)]
 struct JsonClaim<'a> {
     id: &'a str,
+    /// The experiment.
+    group: &'a str,
+    /// Whose settings were judged, where that makes a difference.
+    settings: Option<Settings>,
     claim: &'a str,
     paper: &'a str,
     ours: &'a str,
     seeds: &'a [u64],
+    /// Judged runs or pairs of runs.
+    judged: usize,
     fraction: Option<f64>,
     verdict: Verdict,
     reason: Option<&'a str>,
@@ -138,10 +144,13 @@ impl<'a> JsonClaim<'a> {
     fn of(claim: &'a Claim) -> Self {
         Self {
             id: &claim.id,
+            group: &claim.group,
+            settings: claim.settings,
             claim: &claim.claim,
             paper: &claim.paper,
             ours: &claim.ours,
             seeds: &claim.seeds,
+            judged: claim.judged,
             fraction: claim.fraction,
             verdict: claim.verdict,
             reason: claim.reason.as_ref().map(|reason| reason.text.as_str()),

@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use vehicle_dyn::metrics::Outcome;
 
+use super::cast::rank;
 use super::collect::{SUMMARY_FILE, read_json};
-use super::data::{self, Problem, RunFigures, Scene, SeedRow};
+use super::data::{self, Problem, Role, Run, RunFigures, Scene, SeedRow, UnloggedRun};
 use super::measures::{SeedRun, rows_of};
 use crate::summary::Summary;
 use crate::timing::{TimedForm, TimingRow, TimingTable};
@@ -118,14 +119,7 @@ impl Campaign {
             controller: run.controller.clone(),
             mirrored: run.mirrored,
             completed: Some(run.outcome == Outcome::Completed),
-            figures: RunFigures {
-                ltr_abs_max: Some(run.ltr_abs_max),
-                speed_mean_kmh: Some(run.speed_mean_kmh),
-                speed_min_kmh: Some(run.speed_min_kmh),
-                path_deviation_max_m: Some(run.path_deviation_max_m),
-                cost: run.cost,
-                ..RunFigures::default()
-            },
+            figures: figures_of(run),
         });
         let failed = self.failures.iter().map(|run| SeedRun {
             scene: title(&run.scenario),
@@ -136,9 +130,57 @@ impl Campaign {
         });
         let mut runs: Vec<SeedRun> = made.chain(failed).collect();
         let place = |run: &SeedRun| scenes.iter().position(|s| s.title == run.scene);
-        let order = |run: &SeedRun| (place(run), run.controller.clone(), run.mirrored);
+        let order = |run: &SeedRun| {
+            let controller = run.controller.clone();
+            (
+                place(run),
+                Role::of_name(&controller).order(),
+                rank(&controller),
+                controller,
+                run.mirrored,
+            )
+        };
         runs.sort_by_key(order);
         rows_of(&runs)
+    }
+
+    /// The runs that no scene shows, in the order of the campaign.
+    #[must_use]
+    pub fn unlogged(&self, scenes: &[Scene]) -> Vec<UnloggedRun> {
+        let shown = |scenario: &str, like: &Run| {
+            let mut runs = scenes
+                .iter()
+                .filter(|s| s.name == scenario)
+                .flat_map(|s| &s.runs);
+            runs.any(|run| {
+                // A run that no recording matters to is shown without a seed.
+                let same_seed = run.seed.is_none() || run.seed == like.seed;
+                same_seed && run.controller == like.controller && run.mirrored == like.mirrored
+            })
+        };
+        let run = |controller: &str, seed: u64, mirrored: bool| Run {
+            controller: controller.to_owned(),
+            label: controller.to_owned(),
+            seed: Some(seed),
+            mirrored,
+            ..Run::default()
+        };
+        let made = self.summaries.iter().map(|summary| UnloggedRun {
+            scene: summary.scenario.clone(),
+            run: Run {
+                outcome: Some(summary.outcome),
+                figures: figures_of(summary),
+                ..run(&summary.controller, summary.seed, summary.mirrored)
+            },
+            failure: None,
+        });
+        let failed = self.failures.iter().map(|failure| UnloggedRun {
+            scene: failure.scenario.clone(),
+            run: run(&failure.controller, failure.seed, failure.mirrored),
+            failure: Some(failure.reason.clone()),
+        });
+        let all = made.chain(failed);
+        all.filter(|one| !shown(&one.scene, &one.run)).collect()
     }
 
     /// The table of costs and times as the page shows it.
@@ -146,6 +188,27 @@ impl Campaign {
     pub fn timing_rows(&self) -> Vec<data::TimingRow> {
         let rows = self.timing.iter().flat_map(|table| &table.rows);
         rows.map(timing_row).collect()
+    }
+}
+
+/// The numbers of a log that is not there any more.
+fn figures_of(run: &Summary) -> RunFigures {
+    // The driver alone decides nothing that could be timed.
+    let timed = |us: f64| (run.step_time_us.max > 0.0).then_some(us);
+    RunFigures {
+        steps: run.steps,
+        end_time_s: Some(run.end_time_s),
+        ltr_abs_max: Some(run.ltr_abs_max),
+        ltr_violation_s: Some(run.ltr_violation_s),
+        roll_abs_max_deg: Some(run.measures.roll_abs_max_rad.to_degrees()),
+        speed_min_kmh: Some(run.speed_min_kmh),
+        speed_mean_kmh: Some(run.speed_mean_kmh),
+        path_deviation_max_m: Some(run.path_deviation_max_m),
+        steering_correction_max_deg: Some(run.steering_correction_max_deg),
+        cost: run.cost,
+        fallback_steps: Some(run.fallback_steps),
+        step_time_median_us: timed(run.step_time_us.median),
+        step_time_max_us: timed(run.step_time_us.max),
     }
 }
 

@@ -89,8 +89,9 @@ pub(crate) fn line_chart(
     Ok(svg)
 }
 
-type Backend<'a> = SVGBackend<'a>;
-type DrawResult = Result<(), DrawingAreaErrorKind<<Backend<'static> as DrawingBackend>::ErrorType>>;
+pub(super) type Backend<'a> = SVGBackend<'a>;
+pub(super) type DrawResult =
+    Result<(), DrawingAreaErrorKind<<Backend<'static> as DrawingBackend>::ErrorType>>;
 
 fn draw(
     area: &DrawingArea<Backend<'_>, Shift>,
@@ -135,9 +136,10 @@ fn draw(
     area.present()
 }
 
-type Chart<'a, 'b> = ChartContext<'a, Backend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+pub(super) type Chart<'a, 'b> =
+    ChartContext<'a, Backend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
-fn draw_series(chart: &mut Chart<'_, '_>, line: &Series<'_>) -> DrawResult {
+pub(super) fn draw_series(chart: &mut Chart<'_, '_>, line: &Series<'_>) -> DrawResult {
     let style = line.style;
     let mut named = line.name;
     // A gap ends a stroke.

@@ -6,6 +6,7 @@ use serde::Deserialize;
 use vehicle_dyn::metrics::Outcome;
 
 use super::campaign::Campaign;
+use super::cast::rank;
 use super::claims;
 use super::data::{Limits, Problem, Provenance, Report, Role, Run, Scene};
 use super::log::{self, Renamed, TIME};
@@ -69,7 +70,13 @@ pub fn collect(paths: &[PathBuf], renamed: &Renamed) -> Report {
             .collect();
         scene.runs.sort_by_key(|run| {
             let place = names.iter().position(|name| *name == run.controller);
-            (order(run.role), place, run.mirrored, run.seed)
+            (
+                run.role.order(),
+                rank(&run.controller),
+                place,
+                run.mirrored,
+                run.seed,
+            )
         });
         if scene.vehicle.is_none() {
             report.notes.push(format!(
@@ -101,6 +108,7 @@ fn add_campaign(report: &mut Report, campaign: &Campaign) {
     report.claims = claims::judge(campaign);
     report.timing = campaign.timing_rows();
     report.seeds = campaign.seed_rows(&report.scenes);
+    report.unlogged = campaign.unlogged(&report.scenes);
     report.notes.insert(0, claims::RULE.into());
     if let Some(table) = &campaign.timing {
         report
@@ -126,17 +134,6 @@ fn provenance() -> Provenance {
             std::env::consts::OS,
             std::env::consts::ARCH
         ),
-    }
-}
-
-/// The driver first: the others are drawn over him.
-fn order(role: Role) -> usize {
-    match role {
-        Role::Driver => 0,
-        Role::Floor => 1,
-        Role::Deepc => 2,
-        Role::Lmpc => 3,
-        Role::Other => 4,
     }
 }
 

@@ -21,6 +21,9 @@ pub struct Report {
     pub timing: Vec<TimingRow>,
     /// What was driven.
     pub scenes: Vec<Scene>,
+    /// Runs of which the numbers are known, but no log was kept.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub unlogged: Vec<UnloggedRun>,
     /// Outcomes over the recording seeds.
     pub seeds: Vec<SeedRow>,
     /// Files that could not be read, or not wholly.
@@ -34,8 +37,13 @@ pub struct Report {
 /// A claim and its outcome.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Claim {
-    /// Short name, unique in the report.
+    /// Short name, unique in the report; that of a claim with [`Settings::Paper`] ends in `-paper`, and
+    /// is else the one it has with the recommended settings.
     pub id: String,
+    /// The experiment that it belongs to; a heading in the table of claims.
+    pub group: String,
+    /// Whose settings were judged, where that makes a difference.
+    pub settings: Option<Settings>,
     /// The claim in a sentence.
     pub claim: String,
     /// What the paper shows for it.
@@ -44,12 +52,33 @@ pub struct Claim {
     pub ours: String,
     /// Recording seeds that judged it.
     pub seeds: Vec<u64>,
+    /// Number of judged runs, or of pairs of runs.
+    pub judged: usize,
     /// Fraction of the judged runs in which it holds, 0 to 1.
     pub fraction: Option<f64>,
     /// The verdict, computed by the rule that [`Verdict`] states.
     pub verdict: Verdict,
     /// Why it came out so.
     pub reason: Option<Reason>,
+}
+
+/// Whose settings the controllers have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Settings {
+    /// Ours.
+    Recommended,
+    /// The paper's, as far as it gives them.
+    Paper,
+}
+
+impl std::fmt::Display for Settings {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.write_str(match self {
+            Self::Recommended => "recommended",
+            Self::Paper => "paper",
+        })
+    }
 }
 
 /// Why a claim came out as it did.
@@ -363,6 +392,17 @@ pub struct Run {
         skip_serializing_if = "BTreeMap::is_empty"
     )]
     pub columns: Columns,
+}
+
+/// A run without a log.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct UnloggedRun {
+    /// [`Scene::name`].
+    pub scene: String,
+    /// The run, without columns.
+    pub run: Run,
+    /// Why it could not be made, if so.
+    pub failure: Option<String>,
 }
 
 /// Columns of a log by name.

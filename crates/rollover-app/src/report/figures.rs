@@ -1,23 +1,28 @@
-//! The figures of a report as SVG, for a paper: one for every plot of the page.
+//! The figures of a report as SVG: those of the paper, and one for every plot of the page.
 
 use anyhow::Result;
 use plotters::prelude::{Color, RGBColor, ShapeStyle};
 
+use super::cast::drawn_first;
 use super::chart::{Axes, Field, Series, limit_style, line_chart, run_width};
 use super::data::{Point, Report, Run, Scene, TerrainMap};
 use super::log::TIME;
 use super::pack::{Grid, Thinning};
-use super::plots::{Look, PLOTS, Plot, WHEEL_LOADS, drawn_first, looks};
+use super::paper_figures::paper_figures;
+use super::plots::{Look, PLOTS, Plot, WHEEL_LOADS, looks};
 
 /// A drawn figure.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Figure {
-    /// File name without extension: the scene's name and the plot's.
+    /// File name without extension: the scene's name and the plot's, or one of
+    /// [`PAPER_FIGURES`](super::PAPER_FIGURES).
     pub name: String,
     /// What it shows, in a sentence.
     pub caption: String,
     /// The drawing.
     pub svg: String,
+    /// Whether it is one of the paper's figures, which lie apart from those of the page's plots.
+    pub of_the_paper: bool,
 }
 
 /// The part of a figure's file name that tells its plot.
@@ -42,19 +47,19 @@ const INSTANTS: f64 = 1600.0;
 /// Fields of a terrain of which more would make the figure slow to draw.
 const MOST_FIELDS: usize = 6000;
 /// Colours and names of the wheel loads, in the order of their columns.
-const WHEELS: [(&str, RGBColor, [u8; 2]); 4] = [
+pub(super) const WHEELS: [(&str, RGBColor, [u8; 2]); 4] = [
     ("front left", RGBColor(0, 95, 173), [0, 0]),
     ("front right", RGBColor(213, 94, 0), [0, 0]),
     ("rear left", RGBColor(0, 95, 173), [6, 4]),
     ("rear right", RGBColor(213, 94, 0), [6, 4]),
 ];
 
-/// Draws every plot of every scene.
+/// Draws the paper's figures for which there are runs, and every plot of every scene.
 ///
 /// # Errors
 /// When a figure cannot be drawn.
 pub fn figures(report: &Report) -> Result<Vec<Figure>> {
-    let mut all = Vec::new();
+    let mut all = paper_figures(report)?;
     for scene in &report.scenes {
         for plot in &PLOTS {
             all.extend(time_plot(scene, plot)?);
@@ -87,18 +92,18 @@ fn shown(scene: &Scene) -> impl Iterator<Item = (usize, &Run, Look)> {
     runs.map(|(index, ((run, look), _))| (index, run, look))
 }
 
-fn colour(look: Look) -> RGBColor {
+pub(super) fn colour(look: Look) -> RGBColor {
     let [r, g, b] = look.light;
     RGBColor(r, g, b)
 }
 
-fn ended_early(run: &Run) -> bool {
+pub(super) fn ended_early(run: &Run) -> bool {
     use vehicle_dyn::metrics::Outcome;
     matches!(run.outcome, Some(Outcome::RolledOver | Outcome::SpunOut))
 }
 
 /// A column of a run over time, with no more points than the figure shows.
-fn trace(run: &Run, column: &str) -> Option<Vec<(f64, f64)>> {
+pub(super) fn trace(run: &Run, column: &str) -> Option<Vec<(f64, f64)>> {
     let (time, values) = (run.columns.get(TIME)?, run.columns.get(column)?);
     let (&start, &end) = (time.first()?, time.last()?);
     let step = (end - start) / INSTANTS;
@@ -116,7 +121,7 @@ fn trace(run: &Run, column: &str) -> Option<Vec<(f64, f64)>> {
     Some(points)
 }
 
-fn series(name: &str, style: ShapeStyle, points: Vec<(f64, f64)>) -> Series<'_> {
+pub(super) fn series(name: &str, style: ShapeStyle, points: Vec<(f64, f64)>) -> Series<'_> {
     Series {
         name,
         style,
@@ -182,6 +187,7 @@ fn figure(scene: &Scene, plot: &str, caption: &str, svg: String) -> Result<Optio
         name: format!("{}-{plot}", file_name(&scene.name)),
         caption: caption.into(),
         svg,
+        of_the_paper: false,
     }))
 }
 
@@ -221,14 +227,18 @@ fn wheel_loads(scene: &Scene) -> Result<Vec<Figure>> {
             ),
             caption: "Vertical tyre loads.".into(),
             svg: line_chart(WIDE, &axes, &lines)?,
+            of_the_paper: false,
         });
     }
     Ok(drawn)
 }
 
+pub(super) fn line(points: &[Point]) -> Vec<(f64, f64)> {
+    points.iter().map(|p| (p[0], p[1])).collect()
+}
+
 /// Top view at one scale in both directions, so that a turn has its true shape.
 fn road(scene: &Scene) -> Result<Option<Figure>> {
-    let line = |points: &[Point]| points.iter().map(|p| (p[0], p[1])).collect::<Vec<_>>();
     let mut lines = Vec::new();
     if let Some(road) = &scene.road {
         for edge in [&road.left, &road.right] {
@@ -281,7 +291,7 @@ fn road(scene: &Scene) -> Result<Option<Figure>> {
 }
 
 /// Heights within a view as fields, dark where low; neighbours share one where there are too many.
-fn heights(map: &TerrainMap, x: (f64, f64), y: (f64, f64)) -> Vec<Field> {
+pub(super) fn heights(map: &TerrainMap, x: (f64, f64), y: (f64, f64)) -> Vec<Field> {
     let known = map.heights_m.iter().copied().filter(|h| h.is_finite());
     let (low, high) = known.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| {
         (low.min(h), high.max(h))
@@ -360,7 +370,7 @@ fn profile(scene: &Scene) -> Result<Option<Figure>> {
     figure(scene, "terrain", caption, line_chart(WIDE, &axes, &lines)?)
 }
 
-fn extent(lines: &[Series<'_>], f: fn(&(f64, f64)) -> f64) -> (f64, f64) {
+pub(super) fn extent(lines: &[Series<'_>], f: fn(&(f64, f64)) -> f64) -> (f64, f64) {
     let values = lines
         .iter()
         .flat_map(|s| &s.points)

@@ -11,10 +11,11 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use vehicle_dyn::metrics::Outcome;
 
+use super::cast::{casts, drawn_first};
 use super::data::{Columns, Report, Scene, TerrainMap, VehicleShape};
 use super::log::TIME;
 use super::pack::{Grid, Packed, Thinning, unwrapped_deg};
-use super::plots::{PLOTS, drawn_first, looks, page_columns};
+use super::plots::{PLOTS, looks, page_columns};
 
 const STYLES: &str = concat!(
     include_str!("../../assets/report/uPlot.min.css"),
@@ -33,6 +34,7 @@ const PROGRAM: &str = concat!(
     "(() => {\n\"use strict\";\n",
     include_str!("../../assets/report/page.js"),
     include_str!("../../assets/report/tables.js"),
+    include_str!("../../assets/report/claims.js"),
     include_str!("../../assets/report/plots.js"),
     include_str!("../../assets/report/road.js"),
     include_str!("../../assets/report/vehicle.js"),
@@ -94,8 +96,10 @@ fn page_data(report: &Report) -> Result<Value> {
         .collect::<Result<_>>()?;
     let mut bare = report.clone();
     bare.scenes.clear();
+    bare.unlogged.clear();
     let mut data = serde_json::to_value(&bare).context("the report is no JSON")?;
     data["scenes"] = scenes.into();
+    data["unlogged_runs"] = report.unlogged.len().into();
     data["plots"] = serde_json::to_value(PLOTS)?;
     Ok(data)
 }
@@ -172,6 +176,7 @@ fn scene_data(scene: &Scene, step_s: f64) -> Result<Value> {
         .map(|plot| (plot.name.to_owned(), json!(plot.limits.values(scene))))
         .collect::<serde_json::Map<_, _>>()
         .into();
+    data["casts"] = serde_json::to_value(casts(&scene.runs))?;
     data["grid"] = serde_json::to_value(grid)?;
     data["runs"] = runs.into();
     Ok(data)

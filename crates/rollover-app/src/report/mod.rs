@@ -8,6 +8,7 @@
 //! calls [`write()`].
 
 mod campaign;
+mod cast;
 pub(crate) mod chart;
 pub mod claims;
 mod collect;
@@ -20,9 +21,12 @@ pub mod mat;
 mod measures;
 mod output;
 mod pack;
+mod panels;
+mod paper_figures;
 mod plots;
 mod scene_file;
 mod scene_ground;
+mod snapshot;
 mod table;
 mod tables;
 
@@ -34,6 +38,7 @@ pub use figures::{FIGURE_ENDS, Figure, figures};
 pub use html::html;
 pub use measures::{outcome, run_figures, seed_rows};
 pub use output::{REPORT_FILE, Written, remove_old, write};
+pub use paper_figures::PAPER_FIGURES;
 pub use scene_file::{SCENE_FILE, SceneFile};
 pub use table::summary_table;
 pub use tables::{TABLE_NAMES, Table, tables};

@@ -4,13 +4,16 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 
+use super::cast::PAPER_SUFFIX;
 use super::data::Report;
-use super::{FIGURE_ENDS, TABLE_NAMES, figures, html, tables};
+use super::{FIGURE_ENDS, PAPER_FIGURES, TABLE_NAMES, figures, html, tables};
 use crate::output::{create_folder, write_whole};
 
 /// The page's usual name.
 pub const REPORT_FILE: &str = "report.html";
 const FIGURES: &str = "figures";
+/// Within [`FIGURES`]: one for every plot of the page.
+const SCENES: &str = "scenes";
 const TABLES: &str = "tables";
 
 /// What was written.
@@ -20,7 +23,7 @@ pub struct Written {
     pub page: PathBuf,
     /// Its size, bytes.
     pub page_bytes: usize,
-    /// Number of figures, beside the page in `figures/`.
+    /// Number of figures, beside the page in `figures/` and `figures/scenes/`.
     pub figures: usize,
     /// Number of tables, beside the page in `tables/`.
     pub tables: usize,
@@ -36,12 +39,13 @@ pub fn write(report: &Report, page: &Path) -> Result<Written> {
     let (figures, tables) = (figures(report)?, tables(report)?);
     create_folder(folder)?;
     remove_old(page)?;
-    if !figures.is_empty() {
-        create_folder(&folder.join(FIGURES))?;
-    }
     for figure in &figures {
-        let file = folder.join(FIGURES).join(format!("{}.svg", figure.name));
-        write_whole(&file, &figure.svg)?;
+        let mut place = folder.join(FIGURES);
+        if !figure.of_the_paper {
+            place.push(SCENES);
+        }
+        create_folder(&place)?;
+        write_whole(&place.join(format!("{}.svg", figure.name)), &figure.svg)?;
     }
     if !tables.is_empty() {
         create_folder(&folder.join(TABLES))?;
@@ -71,22 +75,36 @@ pub fn remove_old(page: &Path) -> Result<()> {
     for table in TABLE_NAMES {
         remove(&folder.join(TABLES).join(format!("{table}.csv")))?;
     }
-    let Ok(entries) = std::fs::read_dir(folder.join(FIGURES)) else {
+    let figures = folder.join(FIGURES);
+    remove_figures(&figures.join(SCENES), is_of_a_scene)?;
+    // Earlier versions had all in one folder.
+    remove_figures(&figures, |name| {
+        is_of_the_paper(name) || is_of_a_scene(name)
+    })
+}
+
+fn remove_figures(folder: &Path, ours: impl Fn(&str) -> bool) -> Result<()> {
+    let Ok(entries) = std::fs::read_dir(folder) else {
         return Ok(());
     };
     for entry in entries.flatten() {
         let name = entry.file_name();
-        let ours = name.to_str().and_then(|name| name.strip_suffix(".svg"));
-        let ours = ours.is_some_and(|n| {
-            FIGURE_ENDS
-                .iter()
-                .any(|end| n.ends_with(&format!("-{end}")))
-        });
-        if ours {
+        let name = name.to_str().and_then(|name| name.strip_suffix(".svg"));
+        if name.is_some_and(&ours) {
             remove(&entry.path())?;
         }
     }
     Ok(())
+}
+
+fn is_of_a_scene(name: &str) -> bool {
+    let mut ends = FIGURE_ENDS.iter();
+    ends.any(|end| name.ends_with(&format!("-{end}")))
+}
+
+fn is_of_the_paper(name: &str) -> bool {
+    let plain = name.strip_suffix(PAPER_SUFFIX).unwrap_or(name);
+    PAPER_FIGURES.contains(&plain)
 }
 
 fn folder_of(page: &Path) -> &Path {

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::cast::rank;
 use super::data::{Limits, Role, Run, Scene};
 use super::measures::CORRECTION;
 use super::pack::Thinning;
@@ -218,17 +219,21 @@ const DRIVER: [Look; 2] = [
     look([213, 94, 0], [255, 140, 66], [0, 0]),
     look([150, 62, 0], [255, 183, 133], [7, 4]),
 ];
-const DEEPC: [Look; 4] = [
+const DEEPC: [Look; 6] = [
     look([0, 95, 173], [92, 173, 255], [0, 0]),
     look([53, 154, 217], [152, 214, 255], [8, 4]),
     look([48, 54, 148], [140, 149, 255], [3, 3]),
     look([0, 132, 160], [90, 220, 240], [12, 4]),
+    look([92, 110, 190], [176, 186, 255], [5, 3]),
+    look([0, 82, 110], [120, 190, 220], [16, 4]),
 ];
-const LMPC: [Look; 4] = [
+const LMPC: [Look; 6] = [
     look([0, 128, 94], [46, 204, 150], [0, 0]),
     look([98, 150, 16], [184, 224, 96], [8, 4]),
     look([0, 92, 60], [120, 224, 190], [3, 3]),
     look([74, 122, 78], [160, 205, 150], [12, 4]),
+    look([60, 170, 130], [140, 236, 200], [5, 3]),
+    look([110, 120, 30], [206, 214, 120], [16, 4]),
 ];
 const FLOOR: [Look; 2] = [
     look([168, 118, 0], [240, 196, 60], [0, 0]),
@@ -241,7 +246,8 @@ const OTHER: [Look; 4] = [
     look([60, 64, 70], [220, 224, 230], [12, 4]),
 ];
 
-/// The looks of a scene's runs, in their order. Runs of one controller look the same.
+/// The looks of a scene's runs, in their order. Runs of one controller look the same; the paper's
+/// controllers come first, so that they look the same in all scenes.
 pub(super) fn looks(runs: &[Run]) -> Vec<Look> {
     let mut seen: Vec<(Role, &str)> = Vec::new();
     for run in runs {
@@ -250,6 +256,7 @@ pub(super) fn looks(runs: &[Run]) -> Vec<Look> {
             seen.push(driven);
         }
     }
+    seen.sort_by_key(|(_, controller)| rank(controller));
     let look_of = |run: &Run| {
         let looks: &[Look] = match run.role {
             Role::Driver => &DRIVER,
@@ -265,19 +272,4 @@ pub(super) fn looks(runs: &[Run]) -> Vec<Look> {
         looks[place.unwrap_or(0) % looks.len()]
     };
     runs.iter().map(look_of).collect()
-}
-
-/// Runs of which more would hide one another in a plot.
-const MOST_RUNS: usize = 8;
-
-/// Which runs are drawn at first: all, or of many one of each controller.
-pub(super) fn drawn_first(runs: &[Run]) -> Vec<bool> {
-    let first_of_its_kind = |(index, run): (usize, &Run)| {
-        runs.len() <= MOST_RUNS || {
-            let before = runs[..index].iter();
-            let mut same = before.filter(|r| r.role == run.role && r.controller == run.controller);
-            same.next().is_none()
-        }
-    };
-    runs.iter().enumerate().map(first_of_its_kind).collect()
 }

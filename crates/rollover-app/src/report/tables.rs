@@ -2,7 +2,8 @@
 
 use anyhow::Result;
 
-use super::data::Report;
+use super::cast::rank;
+use super::data::{Report, Role, Run};
 
 /// A table.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -55,10 +56,13 @@ fn claims(report: &Report) -> Content {
         let seeds: Vec<String> = claim.seeds.iter().map(u64::to_string).collect();
         vec![
             claim.id.clone(),
+            claim.group.clone(),
+            text(claim.settings),
             claim.claim.clone(),
             claim.paper.clone(),
             claim.ours.clone(),
             seeds.join(" "),
+            claim.judged.to_string(),
             text(claim.fraction),
             claim.verdict.to_string(),
             text(claim.reason.as_ref().map(|reason| &reason.text)),
@@ -66,7 +70,8 @@ fn claims(report: &Report) -> Content {
     };
     (
         &[
-            "id", "claim", "paper", "ours", "seeds", "fraction", "verdict", "reason",
+            "id", "group", "settings", "claim", "paper", "ours", "seeds", "judged", "fraction",
+            "verdict", "reason",
         ],
         report.claims.iter().map(row).collect(),
     )
@@ -134,35 +139,59 @@ fn seeds(report: &Report) -> Content {
     )
 }
 
+/// Every run, also those without a log, grouped by controller.
 fn runs(report: &Report) -> Content {
-    let mut rows = Vec::new();
-    for scene in &report.scenes {
-        for run in &scene.runs {
-            let f = &run.figures;
-            rows.push(vec![
-                scene.name.clone(),
-                run.label.clone(),
-                run.controller.clone(),
-                text(run.seed),
-                run.mirrored.to_string(),
-                text(run.outcome),
-                f.steps.to_string(),
-                text(f.end_time_s),
-                text(f.ltr_abs_max),
-                text(f.ltr_violation_s),
-                text(f.roll_abs_max_deg),
-                text(f.speed_min_kmh),
-                text(f.speed_mean_kmh),
-                text(f.path_deviation_max_m),
-                text(f.steering_correction_max_deg),
-                text(f.cost),
-                text(f.fallback_steps),
-                text(f.step_time_median_us),
-                text(f.step_time_max_us),
-                run.source.clone(),
-            ]);
-        }
-    }
+    let logged = report.scenes.iter().flat_map(|scene| {
+        let of_scene = scene.runs.iter();
+        of_scene.map(|run| (scene.name.as_str(), run, None))
+    });
+    let unlogged = report.unlogged.iter();
+    let unlogged = unlogged.map(|one| (one.scene.as_str(), &one.run, one.failure.as_deref()));
+    let mut all: Vec<(&str, &Run, Option<&str>)> = logged.chain(unlogged).collect();
+    let place = |name: &str| report.scenes.iter().position(|scene| scene.name == name);
+    // Stable: what this does not order stays as it is.
+    all.sort_by_key(|(scene, run, _)| {
+        let role = Role::of_name(&run.controller).order();
+        let controller = run.controller.as_str();
+        let last = place(scene).unwrap_or(usize::MAX);
+        (
+            last,
+            role,
+            rank(controller),
+            controller,
+            run.mirrored,
+            run.seed,
+        )
+    });
+    let row = |(scene, run, failure): &(&str, &Run, Option<&str>)| {
+        let f = &run.figures;
+        // What could not be made has no numbers.
+        let made = failure.is_none();
+        vec![
+            (*scene).to_owned(),
+            run.label.clone(),
+            run.controller.clone(),
+            text(run.seed),
+            run.mirrored.to_string(),
+            text(run.outcome),
+            text(made.then_some(f.steps)),
+            text(f.end_time_s),
+            text(f.ltr_abs_max),
+            text(f.ltr_violation_s),
+            text(f.roll_abs_max_deg),
+            text(f.speed_min_kmh),
+            text(f.speed_mean_kmh),
+            text(f.path_deviation_max_m),
+            text(f.steering_correction_max_deg),
+            text(f.cost),
+            text(f.fallback_steps),
+            text(f.step_time_median_us),
+            text(f.step_time_max_us),
+            run.source.clone(),
+            failure.unwrap_or_default().to_owned(),
+        ]
+    };
+    let rows = all.iter().map(row).collect();
     (
         &[
             "scene",
@@ -185,6 +214,7 @@ fn runs(report: &Report) -> Content {
             "step_time_median_us",
             "step_time_max_us",
             "log",
+            "failure",
         ],
         rows,
     )

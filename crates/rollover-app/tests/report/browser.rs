@@ -7,6 +7,7 @@ use std::process::Command;
 use rollover_app::report::data::{Report, Run, Scene};
 use rollover_app::report::{html, run_figures};
 
+use super::paper::paper;
 use super::{folder, full};
 
 const BROWSERS: [&str; 5] = [
@@ -104,6 +105,21 @@ fn plots_replay_cursor_and_keys_work() {
             "{found:#}"
         );
     }
+}
+
+#[test]
+fn a_campaigns_page_begins_with_the_papers_cast_and_pair() {
+    let cast = ["driver", "rd-deepc-1", "rd-deepc-2", "lmpc-1", "lmpc-2"];
+    if let Some(found) = passes(&paper(400), false, &[WIDE]) {
+        assert_eq!(found["drawn"][0], serde_json::json!(cast));
+        assert_eq!(
+            found["drawn"][1],
+            serde_json::json!(["driver", "rd-deepc-1", "lmpc-1"])
+        );
+        let pair = serde_json::json!(["rd-deepc-1", "lmpc-1"]);
+        assert_eq!(found["pairs"], serde_json::json!([pair, pair, pair]));
+    }
+    passes(&paper(400), true, &[WIDE]);
 }
 
 #[test]

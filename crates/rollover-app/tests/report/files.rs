@@ -78,13 +78,17 @@ fn files_of_an_earlier_report_are_replaced_and_others_kept() {
     write(&full(), &page).expect("the folder can be written");
     let at = |name: &str| folder.path().join(name);
     std::fs::write(at("figures/mine.svg"), "mine").expect("writable");
-    std::fs::write(at("figures/gone-ltr.svg"), "old").expect("writable");
+    std::fs::write(at("figures/scenes/gone-ltr.svg"), "old").expect("writable");
+    std::fs::write(at("figures/older-ltr.svg"), "older").expect("writable");
     let mut small = full();
     small.claims.clear();
     small.scenes[0].profile = None;
     let written = write(&small, &page).expect("the folder can be written");
     assert!(written.page_bytes < 5_000_000);
-    assert!(!at("figures/gone-ltr.svg").exists() && !at("figures/turn-terrain.svg").exists());
+    for gone in ["gone-ltr", "turn-terrain"] {
+        assert!(!at(&format!("figures/scenes/{gone}.svg")).exists());
+    }
+    assert!(!at("figures/older-ltr.svg").exists() && at("figures/scenes/turn-ltr.svg").exists());
     assert!(!at("tables/claims.csv").exists() && at("tables/runs.csv").exists());
     assert_eq!(text(&at("figures/mine.svg")), "mine");
 }

@@ -5,10 +5,11 @@ mod command;
 mod files;
 mod logs;
 mod page;
+mod paper;
 
 use rollover_app::report::data::{
     Claim, Columns, HeightProfile, Limits, Provenance, Reason, Report, Road, Role, Run, RunLink,
-    Scene, TerrainMap, TimingRow, VehicleShape, Verdict,
+    Scene, Settings, TerrainMap, TimingRow, VehicleShape, Verdict,
 };
 use rollover_app::report::{run_figures, seed_rows};
 use rollover_app::run_log::{LogRow, LogWriter, SolveStatus};
@@ -129,10 +130,13 @@ fn full() -> Report {
         asked: vec!["Does it hold?".into()],
         claims: vec![Claim {
             id: "lmpc-rolls".into(),
+            group: "Sedan".into(),
+            settings: Some(Settings::Recommended),
             claim: "The linear MPC rolls over.".into(),
             paper: "It rolls at 23 s.".into(),
             ours: "It stays on its wheels.".into(),
             seeds: (10..20).collect(),
+            judged: 20,
             fraction: Some(0.1),
             verdict: Verdict::of_fraction(0.1),
             reason: Some(Reason {
@@ -155,6 +159,7 @@ fn full() -> Report {
         }],
         seeds: seed_rows(&scenes),
         scenes,
+        unlogged: Vec::new(),
         problems: Vec::new(),
         notes: vec!["A note.".into()],
         provenance: Provenance {

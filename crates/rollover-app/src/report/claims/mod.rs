@@ -9,16 +9,19 @@ mod cases;
 mod reasons;
 
 use super::campaign::Campaign;
-use super::data::{Claim, Verdict};
+use super::data::{Claim, Settings, Verdict};
 use crate::summary::{SPEED_RECOVERED_KMH, Summary};
 use crate::timing::{TimedForm, TimedMethod};
 use cases::{Cases, Count, completed, median, rolled_over, rolled_over_in_the_last_turn, safe};
 
 /// The scenarios of the paper.
 pub const SCENARIOS: [&str; 3] = [SEDAN, TRUCK, RIVERBED];
-const SEDAN: &str = "sedan-s1";
-const TRUCK: &str = "truck-s2";
-const RIVERBED: &str = "riverbed-s3";
+pub(super) const SEDAN: &str = "sedan-s1";
+pub(super) const TRUCK: &str = "truck-s2";
+pub(super) const RIVERBED: &str = "riverbed-s3";
+
+/// Heading of the claims that the paper's table makes.
+const COSTS_AND_TIMES: &str = "Costs and times";
 
 /// What the campaign asks.
 pub const QUESTION: [&str; 2] = [
@@ -41,7 +44,6 @@ const FASTER: f64 = 5.0;
 pub fn judge(campaign: &Campaign) -> Vec<Claim> {
     let judge = Judge { campaign };
     let mut claims = vec![judge.driver()];
-    claims.extend(judge.table());
     for settings in [Settings::Recommended, Settings::Paper] {
         claims.extend(judge.sedan(settings));
     }
@@ -51,14 +53,8 @@ pub fn judge(campaign: &Campaign) -> Vec<Claim> {
     for settings in [Settings::Recommended, Settings::Paper] {
         claims.extend(judge.riverbed(settings));
     }
+    claims.extend(judge.table());
     claims.into_iter().flatten().collect()
-}
-
-/// Whose settings the controllers have.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Settings {
-    Recommended,
-    Paper,
 }
 
 impl Settings {
@@ -66,13 +62,6 @@ impl Settings {
         match self {
             Self::Recommended => "",
             Self::Paper => "-paper",
-        }
-    }
-
-    fn words(self) -> &'static str {
-        match self {
-            Self::Recommended => "recommended settings",
-            Self::Paper => "the paper's settings",
         }
     }
 
@@ -92,6 +81,8 @@ struct Judge<'a> {
 /// The words of a claim.
 struct Words {
     id: String,
+    group: &'static str,
+    settings: Option<Settings>,
     claim: String,
     paper: &'static str,
 }
@@ -100,9 +91,22 @@ impl Words {
     fn new(id: &str, settings: Settings, claim: &str, paper: &'static str) -> Self {
         Self {
             id: format!("{id}{}", settings.suffix()),
-            claim: format!("{claim} ({})", settings.words()),
+            group: group(id),
+            settings: Some(settings),
+            claim: claim.into(),
             paper,
         }
+    }
+}
+
+/// The heading of a claim: its experiment.
+fn group(id: &str) -> &'static str {
+    match id.split_once('-') {
+        _ if id == "s1-cost" => COSTS_AND_TIMES,
+        Some(("s1", _)) => "Sedan",
+        Some(("s2", _)) => "Truck",
+        Some(("s3", _)) => "Riverbed",
+        _ => COSTS_AND_TIMES,
     }
 }
 
@@ -131,9 +135,12 @@ impl<'a> Judge<'a> {
         Some(Claim {
             ours: format!("holds in {count}. {ours}"),
             id: words.id,
+            group: words.group.into(),
+            settings: words.settings,
             claim: words.claim,
             paper: words.paper.into(),
             seeds: cases.seeds(),
+            judged: count.of,
             fraction: count.fraction(),
             verdict,
             reason,
@@ -143,6 +150,8 @@ impl<'a> Judge<'a> {
     fn driver(&self) -> Option<Claim> {
         let words = Words {
             id: "s1-driver".into(),
+            group: group("s1-driver"),
+            settings: None,
             claim: "The driver alone rolls over in the last turn.".into(),
             paper: "rolls over in the last turn, and violates the limit on LTR several times",
         };
@@ -162,6 +171,8 @@ impl<'a> Judge<'a> {
         let cases = self.cases(SEDAN, "deepc-1");
         let words = Words {
             id: "table-same".into(),
+            group: group("table-same"),
+            settings: None,
             claim: "DeePC and RD-DeePC give the same inputs, outputs and cost.".into(),
             paper: "costs 9.94 and 9.95, close agreement of the trajectories",
         };
@@ -183,6 +194,8 @@ impl<'a> Judge<'a> {
         let (deepc, rd_deepc) = (written(TimedMethod::Deepc)?, written(TimedMethod::RdDeepc)?);
         let words = Words {
             id: "table-time".into(),
+            group: group("table-time"),
+            settings: None,
             claim: format!(
                 "The reduction makes a step significantly faster (at least {FASTER} times, both programs as written)."
             ),
