@@ -107,6 +107,7 @@ impl Case {
             rd_deepc,
             lmpc: Some(lmpc),
             moments,
+            deepc_as_written: true,
         }
     }
 }

@@ -290,6 +290,7 @@ impl<'a> Execution<'a> {
                 rd_deepc: logged(1, &rd_deepc),
                 lmpc: Some(logged(2, &lmpc)),
                 moments: self.plan.moments,
+                deepc_as_written: self.plan.deepc_as_written,
             },
             Follow {
                 interrupt: self.interrupt,

@@ -43,7 +43,7 @@ impl Program {
     /// The fingerprint of the timing of a plan.
     pub(super) fn of_timing(self, plan: &Plan, run: &PlannedRun) -> String {
         let mut hasher = DefaultHasher::new();
-        format!("{} {}", self.of_run(plan, run), plan.moments).hash(&mut hasher);
+        (self.of_run(plan, run), plan.moments, plan.deepc_as_written).hash(&mut hasher);
         format!("{:?}", plan.driven(run).scenario.controllers).hash(&mut hasher);
         format!("{:016x}\n", hasher.finish())
     }

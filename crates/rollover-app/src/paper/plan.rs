@@ -30,6 +30,8 @@ pub(super) struct Plan {
     controllers: Vec<String>,
     /// Moments at which the programs as written are timed.
     pub(super) moments: usize,
+    /// Whether `DeePC` as written is timed, which takes most of the time.
+    pub(super) deepc_as_written: bool,
 }
 
 /// A scenario on its course and on the mirror image, with the ground under both.
@@ -79,6 +81,7 @@ impl Plan {
             } else {
                 crate::timing::MOMENTS
             },
+            deepc_as_written: !args.quick,
         })
     }
 

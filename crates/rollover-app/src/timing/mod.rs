@@ -45,6 +45,8 @@ pub struct Timing<'a> {
     /// Moments at which the programs as written are solved: at least [`MOMENTS`], or fewer for a
     /// quick look.
     pub moments: usize,
+    /// Whether `DeePC` is solved as written, too: 20 s and more for each moment.
+    pub deepc_as_written: bool,
 }
 
 /// Moments behind a row of the paper's table, unless a quick look is asked for.

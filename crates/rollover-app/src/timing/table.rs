@@ -26,8 +26,8 @@ pub fn measure(timing: &Timing<'_>, mut follow: Follow<'_>) -> Result<TimingTabl
     let moments = moments::at_bounds(&timing.rd_deepc, timing.moments)?;
     let mut work = Work {
         done: 0,
-        // Both forms as written, three set-ups and up to three replays.
-        total: 2 * moments.len() + 6,
+        // What is solved as written, three set-ups and up to three replays.
+        total: (1 + usize::from(timing.deepc_as_written)) * moments.len() + 6,
     };
     // The smaller one first: it is the yardstick.
     let rd_deepc = on_matrix(
@@ -45,7 +45,8 @@ pub fn measure(timing: &Timing<'_>, mut follow: Follow<'_>) -> Result<TimingTabl
     let yardstick_s = median(&rd_deepc.written.times_s);
     let references = &deepc.condensed.objectives;
     let mut rows = Vec::new();
-    for measured in [&deepc, &rd_deepc] {
+    let written = [&deepc, &rd_deepc].into_iter();
+    for measured in written.filter(|m| !m.written.times_s.is_empty()) {
         rows.push(measured.written_row(references));
     }
     for measured in [&deepc, &rd_deepc] {
@@ -57,7 +58,9 @@ pub fn measure(timing: &Timing<'_>, mut follow: Follow<'_>) -> Result<TimingTabl
     for row in &mut rows {
         row.time_to_rd_deepc = row.step_s_median / yardstick_s;
     }
-    let written = Some((&deepc.written, &rd_deepc.written));
+    let written = timing
+        .deepc_as_written
+        .then_some((&deepc.written, &rd_deepc.written));
     Ok(TimingTable {
         rows,
         moments_s: moments.iter().map(|past| past.time_s).collect(),
@@ -111,9 +114,13 @@ fn on_matrix<'a>(
     };
     let condensed = condensed(whose(TimedForm::Condensed), &problem, moments, follow)?;
     let form = TimedForm::AsWritten;
-    let written = as_written(whose(form), &problem, moments, follow, &mut |follow| {
-        work.next(follow, &format!("{method} {form}"));
-    })?;
+    let written = if method == TimedMethod::Deepc && !timing.deepc_as_written {
+        AtMoments::default()
+    } else {
+        as_written(whose(form), &problem, moments, follow, &mut |follow| {
+            work.next(follow, &format!("{method} {form}"));
+        })?
+    };
     work.next(follow, &format!("{method}: condensed"));
     let along = if run.log.is_empty() {
         timing.rd_deepc
