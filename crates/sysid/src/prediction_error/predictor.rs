@@ -4,6 +4,7 @@ use deepc_core::faer::{Mat, Side};
 
 use super::OutputWeights;
 use crate::error::SysidError;
+use crate::kernels::{Output, march};
 use crate::regressors::{FreeResponse, Packed, PackedRecord, add_product};
 use crate::state_space::SystemMatrices;
 
@@ -35,13 +36,20 @@ impl Evaluation {
         whitening: &Mat<f64>,
         weighting: OutputWeights,
     ) -> Result<Self, SysidError> {
+        let response = free_response(packed, model, whitening)?;
+        Self::with_response(packed, model, &response, whitening, weighting)
+    }
+
+    /// The same for a free response that is known: [`free_response`] of this model and `whitening`.
+    pub fn with_response(
+        packed: &Packed,
+        model: &SystemMatrices,
+        response: &FreeResponse,
+        whitening: &Mat<f64>,
+        weighting: OutputWeights,
+    ) -> Result<Self, SysidError> {
         let (n, p) = (model.order(), packed.outputs);
         let f = model.predictor();
-        let response = FreeResponse::new(
-            f.as_ref(),
-            (whitening * &model.c).as_ref(),
-            packed.longest(),
-        )?;
         let unobserved = Unweighted::new(&f, model, response.kept());
         let (mut states, mut innovations, mut initial) = (Vec::new(), Vec::new(), Vec::new());
         let mut covariance = Mat::zeros(p, p);
@@ -83,6 +91,16 @@ impl Evaluation {
     }
 }
 
+/// The response `W C Fᵏ` to the initial states, F = A − KC.
+pub(super) fn free_response(
+    packed: &Packed,
+    model: &SystemMatrices,
+    whitening: &Mat<f64>,
+) -> Result<FreeResponse, SysidError> {
+    let (f, c) = (model.predictor(), whitening * &model.c);
+    FreeResponse::new(f.as_ref(), c.as_ref(), packed.longest())
+}
+
 /// W and the criterion: log det (Ljung 1999, chapter 7) or the logarithm of the mean variance.
 fn weights(covariance: &Mat<f64>, weighting: OutputWeights) -> Result<(Mat<f64>, f64), SysidError> {
     let p = covariance.nrows();
@@ -116,21 +134,17 @@ fn weights(covariance: &Mat<f64>, weighting: OutputWeights) -> Result<(Mat<f64>,
 
 /// States and innovations from x(0) = 0.
 fn run(record: &PackedRecord, model: &SystemMatrices) -> (Vec<f64>, Vec<f64>) {
-    let (n, m, p) = (model.order(), model.inputs(), model.outputs());
-    let (c, d) = (-&model.c, -&model.d);
-    let mut states = vec![0.0; (record.samples + 1) * n];
+    let n = model.order();
+    let mut states = vec![0.0; record.samples * n];
     let mut innovations = record.outputs.clone();
-    for (k, e) in innovations.chunks_exact_mut(p).enumerate() {
-        let u = &record.inputs[k * m..(k + 1) * m];
-        let (past, future) = states.split_at_mut((k + 1) * n);
-        let (x, next) = (&past[k * n..], &mut future[..n]);
-        add_product(e, &c, x);
-        add_product(e, &d, u);
-        add_product(next, &model.a, x);
-        add_product(next, &model.b, u);
-        add_product(next, &model.k, e);
-    }
-    states.truncate(record.samples * n);
+    march(
+        model,
+        &vec![0.0; n],
+        &record.inputs,
+        &mut innovations,
+        &mut states,
+        Output::Residual,
+    );
     (states, innovations)
 }
 
