@@ -303,6 +303,110 @@ impl<const Q: usize> NullaryFnOnce for Filter<'_, Q> {
     }
 }
 
+/// Adds the free motion `x(k+1) = F x(k)` from `start` to the first `samples` of `states` and `C x(k)` to those of
+/// `series`, all row by row.
+pub(crate) fn add_free(
+    f: &Mat<f64>,
+    c: &Mat<f64>,
+    start: &[f64],
+    samples: usize,
+    states: &mut [f64],
+    series: &mut [f64],
+) {
+    fn wide<const N: usize>(
+        f: &Mat<f64>,
+        c: &Mat<f64>,
+        start: &[f64],
+        samples: usize,
+        states: &mut [f64],
+        series: &mut [f64],
+    ) {
+        let mut first = [0.0; N];
+        first[..start.len()].copy_from_slice(start);
+        widely(AddFree::<N> {
+            f: lanes(f),
+            c: (0..c.nrows())
+                .flat_map(|l| (0..c.ncols()).map(move |j| c[(l, j)]))
+                .collect(),
+            start: first,
+            sizes: (f.nrows(), c.nrows()),
+            samples,
+            states,
+            series,
+        });
+    }
+    let add = match stride(f.nrows()) {
+        0 => return,
+        4 => wide::<4>,
+        8 => wide::<8>,
+        12 => wide::<12>,
+        16 => wide::<16>,
+        _ => plain_add_free,
+    };
+    add(f, c, start, samples, states, series);
+}
+
+struct AddFree<'a, const N: usize> {
+    f: Vec<[f64; N]>,
+    /// Row by row.
+    c: Vec<f64>,
+    start: [f64; N],
+    /// n, p.
+    sizes: (usize, usize),
+    samples: usize,
+    states: &'a mut [f64],
+    series: &'a mut [f64],
+}
+
+impl<const N: usize> NullaryFnOnce for AddFree<'_, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let (n, p) = self.sizes;
+        let mut free = self.start;
+        let series = self.series.chunks_exact_mut(p);
+        let samples = self.states.chunks_exact_mut(n).zip(series);
+        for (states, series) in samples.take(self.samples) {
+            for (state, free) in states.iter_mut().zip(&free) {
+                *state += free;
+            }
+            for (value, c) in series.iter_mut().zip(self.c.chunks_exact(n)) {
+                for (c, free) in c.iter().zip(&free) {
+                    *value += c * free;
+                }
+            }
+            let mut next = [0.0; N];
+            for (column, &free) in self.f.iter().zip(&free) {
+                add(&mut next, column, free);
+            }
+            free = next;
+        }
+    }
+}
+
+fn plain_add_free(
+    f: &Mat<f64>,
+    c: &Mat<f64>,
+    start: &[f64],
+    samples: usize,
+    states: &mut [f64],
+    series: &mut [f64],
+) {
+    let (n, p) = (f.nrows(), c.nrows());
+    let (mut free, mut next) = (start.to_vec(), vec![0.0; n]);
+    let samples = (states.chunks_exact_mut(n))
+        .zip(series.chunks_exact_mut(p))
+        .take(samples);
+    for (states, series) in samples {
+        add_scaled(states, 1.0, &free);
+        add_product(series, c, &free);
+        next.fill(0.0);
+        add_product(&mut next, f, &free);
+        std::mem::swap(&mut free, &mut next);
+    }
+}
+
 /// The rows `c Fᵏ`, each filled up to [`stride`], for k = 0, 1, … until they are at most `decayed` times the
 /// largest, or `samples` times. `None` if they overflow.
 pub(crate) fn free_rows(

@@ -356,16 +356,15 @@ impl<'a> Rows<'a> {
         l: usize,
         mut rows: MatMut<'_, f64>,
     ) {
+        let kept = response.kept().saturating_sub(k).min(rows.nrows());
         for j in 0..basis.ncols() {
             let basis = basis.col_as_slice(j);
-            for step in 0..rows.nrows() {
-                rows[(step, j)] = if k + step < response.kept() {
-                    let free = response.at(k + step, l);
-                    -basis.iter().zip(free).map(|(b, r)| b * r).sum::<f64>()
-                } else {
-                    0.0
-                };
+            let (top, mut rest) = rows.as_mut().col_mut(j).split_at_row_mut(kept);
+            for (step, value) in top.iter_mut().enumerate() {
+                let free = response.at(k + step, l);
+                *value = -basis.iter().zip(free).map(|(b, r)| b * r).sum::<f64>();
             }
+            rest.fill(0.0);
         }
     }
 

@@ -4,8 +4,8 @@ use deepc_core::faer::{Mat, Side};
 
 use super::OutputWeights;
 use crate::error::SysidError;
-use crate::kernels::{Output, march};
-use crate::regressors::{FreeResponse, Packed, PackedRecord, add_product};
+use crate::kernels::{Output, add_free, add_product, add_scaled, march};
+use crate::regressors::{FreeResponse, Packed, PackedRecord};
 use crate::state_space::SystemMatrices;
 
 /// Variance, of outputs with variance 1, below which innovations are rounding.
@@ -48,23 +48,27 @@ impl Evaluation {
         whitening: &Mat<f64>,
         weighting: OutputWeights,
     ) -> Result<Self, SysidError> {
-        let (n, p) = (model.order(), packed.outputs);
+        let p = packed.outputs;
         let f = model.predictor();
-        let unobserved = Unweighted::new(&f, model, response.kept());
+        let c = -&model.c;
         let (mut states, mut innovations, mut initial) = (Vec::new(), Vec::new(), Vec::new());
-        let mut covariance = Mat::zeros(p, p);
+        let mut sums = vec![0.0; p * p];
         for record in &packed.records {
             let (mut x, mut e) = run(record, model);
             let mut weighted = vec![0.0; e.len()];
-            for (weighted, e) in weighted.chunks_exact_mut(p).zip(e.chunks_exact(p)) {
-                add_product(weighted, whitening, e);
+            if p == 1 {
+                add_scaled(&mut weighted, whitening[(0, 0)], &e);
+            } else {
+                for (weighted, e) in weighted.chunks_exact_mut(p).zip(e.chunks_exact(p)) {
+                    add_product(weighted, whitening, e);
+                }
             }
             let start = response.take_off(&mut weighted, &response.basis(record.samples)?);
-            unobserved.add(&start, &mut x, &mut e, n, p);
+            add_free(&f, &c, &start, response.kept(), &mut x, &mut e);
             for e in e.chunks_exact(p) {
-                for i in 0..p {
-                    for j in 0..=i {
-                        covariance[(i, j)] += e[i] * e[j];
+                for (sums, e_i) in sums.chunks_exact_mut(p).zip(e) {
+                    for (sum, e_j) in sums.iter_mut().zip(e) {
+                        *sum += e_i * e_j;
                     }
                 }
             }
@@ -73,12 +77,7 @@ impl Evaluation {
             initial.push(start);
         }
         let samples = packed.samples().max(1) as f64;
-        for i in 0..p {
-            for j in 0..=i {
-                covariance[(i, j)] /= samples;
-                covariance[(j, i)] = covariance[(i, j)];
-            }
-        }
+        let covariance = Mat::from_fn(p, p, |i, j| sums[i * p + j] / samples);
         let (whitening, criterion) = weights(&covariance, weighting)?;
         Ok(Self {
             states,
@@ -146,40 +145,4 @@ fn run(record: &PackedRecord, model: &SystemMatrices) -> (Vec<f64>, Vec<f64>) {
         Output::Residual,
     );
     (states, innovations)
-}
-
-/// The free motion `x(k+1) = F x(k)`, e = −C x, until it has decayed.
-struct Unweighted<'a> {
-    f: &'a Mat<f64>,
-    c: Mat<f64>,
-    samples: usize,
-}
-
-impl<'a> Unweighted<'a> {
-    fn new(f: &'a Mat<f64>, model: &SystemMatrices, samples: usize) -> Self {
-        Self {
-            f,
-            c: -&model.c,
-            samples,
-        }
-    }
-
-    fn add(&self, start: &[f64], states: &mut [f64], innovations: &mut [f64], n: usize, p: usize) {
-        if n == 0 {
-            return;
-        }
-        let (mut free, mut next) = (start.to_vec(), vec![0.0; n]);
-        let samples = states
-            .chunks_exact_mut(n)
-            .zip(innovations.chunks_exact_mut(p));
-        for (x, e) in samples.take(self.samples) {
-            for (x, free) in x.iter_mut().zip(&free) {
-                *x += free;
-            }
-            add_product(e, &self.c, &free);
-            next.fill(0.0);
-            add_product(&mut next, self.f, &free);
-            std::mem::swap(&mut free, &mut next);
-        }
-    }
 }
