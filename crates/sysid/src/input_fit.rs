@@ -3,6 +3,7 @@
 use deepc_core::faer::{Mat, MatRef};
 
 use crate::error::SysidError;
+use crate::kernels::{Output, march};
 use crate::least_squares::{StreamedQr, solve, thin_svd};
 use crate::regressors::{BLOCK, FilterBank, FreeResponse, Packed, PackedRecord, add_product};
 use crate::state_space::SystemMatrices;
@@ -78,7 +79,16 @@ pub(crate) fn fit_inputs(
     let (to_old, to_new) = observable_basis(a, c, packed.longest())?;
     let (a, c) = (&to_new * a * &to_old, c * &to_old);
     let equal = Mat::identity(p, p);
-    let fitted = fit_packed(&packed, &a, &c, structure.dynamic(), &free, &equal)?;
+    let response = FreeResponse::new(a.as_ref(), c.as_ref(), packed.longest())?;
+    let fitted = fit_packed(
+        &packed,
+        &a,
+        &c,
+        structure.dynamic(),
+        &free,
+        &equal,
+        &response,
+    )?;
     let mut fit = InputFit {
         b: Mat::zeros(n, structure.dynamics.len()),
         d: Mat::zeros(p, structure.dynamics.len()),
@@ -127,7 +137,7 @@ pub(crate) struct PackedFit {
 }
 
 /// [`fit_inputs`] in the basis of `a`, over active inputs, the first `dynamic` of which have a free column
-/// of B, with errors e weighed by ‖W e‖².
+/// of B, with errors e weighed by ‖W e‖². `response` is that of A and W C.
 pub(crate) fn fit_packed(
     packed: &Packed,
     a: &Mat<f64>,
@@ -135,10 +145,10 @@ pub(crate) fn fit_packed(
     dynamic: usize,
     free: &[usize],
     weights: &Mat<f64>,
+    response: &FreeResponse,
 ) -> Result<PackedFit, SysidError> {
     let (n, p, inputs) = (a.nrows(), c.nrows(), packed.inputs);
     let c = weights * c;
-    let response = FreeResponse::new(a.as_ref(), c.as_ref(), packed.longest())?;
     let unknowns = n * dynamic + p * free.len();
     let mut bank = FilterBank::new(a.as_ref(), c.as_ref(), dynamic);
     let mut all = StreamedQr::new(unknowns + 1, BLOCK);
@@ -146,7 +156,7 @@ pub(crate) fn fit_packed(
     for record in &packed.records {
         let basis = response.basis(record.samples)?;
         let columns = Columns {
-            response: &response,
+            response,
             basis: &basis,
             free,
             inputs,
@@ -215,13 +225,13 @@ impl Columns<'_> {
                 let (sample, l) = (k + row / p, row % p);
                 let inputs = &record.inputs[sample * self.inputs..(sample + 1) * self.inputs];
                 if sample < self.response.kept() {
-                    let free = &self.response.at(sample)[l * n..(l + 1) * n];
+                    let free = self.response.at(sample, l);
                     for j in 0..states {
                         let basis = self.basis.col_as_slice(j).iter();
                         block[(row, j)] = basis.zip(free).map(|(b, r)| b * r).sum();
                     }
                 }
-                for (j, value) in bank.responses(l).iter().enumerate() {
+                for (j, value) in bank.responses(l).flatten().enumerate() {
                     block[(row, states + j)] = *value;
                 }
                 let mut output = 0.0;
@@ -271,20 +281,16 @@ pub(crate) fn fit_initial_states(
 
 /// One-step prediction errors, row by row, from x(0) = 0.
 fn errors_from_rest(record: &PackedRecord, matrices: &SystemMatrices) -> Vec<f64> {
-    let (n, m, p) = (matrices.order(), matrices.inputs(), matrices.outputs());
-    let (mut x, mut next) = (vec![0.0; n], vec![0.0; n]);
-    let (c, d) = (-&matrices.c, -&matrices.d);
     let mut errors = record.outputs.clone();
-    for (k, error) in errors.chunks_exact_mut(p).enumerate() {
-        let inputs = &record.inputs[k * m..(k + 1) * m];
-        add_product(error, &c, &x);
-        add_product(error, &d, inputs);
-        next.fill(0.0);
-        add_product(&mut next, &matrices.a, &x);
-        add_product(&mut next, &matrices.b, inputs);
-        add_product(&mut next, &matrices.k, error);
-        std::mem::swap(&mut x, &mut next);
-    }
+    let initial = vec![0.0; matrices.order()];
+    march(
+        matrices,
+        &initial,
+        &record.inputs,
+        &mut errors,
+        &mut [],
+        Output::Residual,
+    );
     errors
 }
 
@@ -303,7 +309,7 @@ fn observable_basis(
         let mut rows = qr.rows(p);
         for l in 0..p {
             for j in 0..n {
-                rows[(l, j)] = response.at(k)[l * n + j];
+                rows[(l, j)] = response.at(k, l)[j];
             }
         }
     }

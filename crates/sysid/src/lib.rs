@@ -61,6 +61,7 @@ pub mod figures;
 mod identification;
 mod input_fit;
 mod kalman;
+mod kernels;
 mod least_squares;
 pub mod lmpc;
 mod prediction_error;

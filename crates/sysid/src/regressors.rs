@@ -3,6 +3,8 @@
 use deepc_core::faer::{Mat, MatRef};
 
 use crate::error::SysidError;
+pub(crate) use crate::kernels::{add_product, add_scaled};
+use crate::kernels::{filter, free_rows, stride};
 use crate::least_squares::{StreamedQr, thin_svd};
 use crate::working::{WorkingData, WorkingRecord};
 
@@ -69,29 +71,18 @@ impl Packed {
     }
 }
 
-/// `y += factor·x`.
-pub(crate) fn add_scaled(y: &mut [f64], factor: f64, x: &[f64]) {
-    for (y, x) in y.iter_mut().zip(x) {
-        *y += factor * x;
-    }
-}
-
-/// `y += M x`, column by column.
-pub(crate) fn add_product(y: &mut [f64], m: &Mat<f64>, x: &[f64]) {
-    for (j, &x) in x.iter().enumerate() {
-        add_scaled(y, x, m.col_as_slice(j));
-    }
-}
-
 /// For every output l the responses `v_l(k+1) = Fᵀ v_l(k) + C_lᵀ s_j(k)` to every signal j: entry i
 /// is the response of output l to signal j acting on state i, `C_l (qI − F)⁻¹ e_i s_j`. So n·p
 /// numbers per signal give the derivatives of the output by everything that multiplies the signal.
 pub(crate) struct FilterBank {
     n: usize,
     signals: usize,
+    /// Numbers per state: the signals, filled up to whole registers.
+    lanes: usize,
     /// F and C, row by row.
     f: Vec<f64>,
     c: Vec<f64>,
+    values: Vec<f64>,
     state: Vec<f64>,
     next: Vec<f64>,
 }
@@ -104,13 +95,16 @@ impl FilterBank {
                 .flat_map(|i| (0..m.ncols()).map(move |j| m[(i, j)]))
                 .collect()
         };
+        let lanes = stride(signals);
         Self {
             n,
             signals,
+            lanes,
             f: rows(f),
             c: rows(c),
-            state: vec![0.0; p * n * signals],
-            next: vec![0.0; p * n * signals],
+            values: vec![0.0; lanes],
+            state: vec![0.0; p * n * lanes],
+            next: vec![0.0; p * n * lanes],
         }
     }
 
@@ -118,32 +112,27 @@ impl FilterBank {
         self.state.fill(0.0);
     }
 
-    /// Responses of output `l`: signal j on state i at `i·signals + j`.
-    pub fn responses(&self, l: usize) -> &[f64] {
-        let size = self.n * self.signals;
-        &self.state[l * size..(l + 1) * size]
+    /// Responses of output `l` to all signals, state by state.
+    pub fn responses(&self, l: usize) -> impl Iterator<Item = &[f64]> {
+        let size = self.n * self.lanes;
+        let states = self.state[l * size..(l + 1) * size].chunks_exact(self.lanes.max(1));
+        states.map(|responses| &responses[..self.signals])
     }
 
     /// One sample on, with these values of the signals.
     pub fn step(&mut self, values: &[f64]) {
-        let (n, q) = (self.n, self.signals);
-        if n * q == 0 {
+        let size = self.n * self.lanes;
+        if size == 0 {
             return;
         }
+        self.values[..self.signals].copy_from_slice(values);
         let outputs = self
             .next
-            .chunks_exact_mut(n * q)
-            .zip(self.state.chunks_exact(n * q))
-            .zip(self.c.chunks_exact(n));
+            .chunks_exact_mut(size)
+            .zip(self.state.chunks_exact(size))
+            .zip(self.c.chunks_exact(self.n));
         for ((next, state), c) in outputs {
-            for (i, next) in next.chunks_exact_mut(q).enumerate() {
-                for (next, value) in next.iter_mut().zip(values) {
-                    *next = c[i] * value;
-                }
-                for (h, state) in state.chunks_exact(q).enumerate() {
-                    add_scaled(next, self.f[h * n + i], state);
-                }
-            }
+            filter(&self.f, c, &self.values, state, next, self.lanes);
         }
         std::mem::swap(&mut self.state, &mut self.next);
     }
@@ -155,6 +144,8 @@ pub(crate) struct FreeResponse {
     p: usize,
     /// Samples until they have decayed.
     kept: usize,
+    /// Numbers from one row to the next.
+    stride: usize,
     /// C Fᵏ, row by row, sample after sample.
     rows: Vec<f64>,
     /// Of the records at least `kept` long: n×rank, so that `C Fᵏ basis` is orthonormal over all k.
@@ -166,41 +157,19 @@ impl FreeResponse {
     /// The response overflows within `samples`.
     pub fn new(f: MatRef<'_, f64>, c: MatRef<'_, f64>, samples: usize) -> Result<Self, SysidError> {
         let (n, p) = (f.nrows(), c.nrows());
-        let columns = Mat::from_fn(n, n, |i, j| f[(j, i)]);
-        let mut row: Vec<f64> = (0..p)
-            .flat_map(|l| (0..n).map(move |j| c[(l, j)]))
-            .collect();
-        let mut next = vec![0.0; p * n];
-        let (mut rows, mut largest, mut kept) = (Vec::new(), 0.0_f64, 0);
-        while kept < samples && n > 0 {
-            let size = row
-                .iter()
-                .fold(0.0, |size: f64, value| size.max(value.abs()));
-            if size <= DECAYED * largest {
-                break;
-            }
-            if !(size < f64::MAX.sqrt() && row.iter().all(|value| value.is_finite())) {
-                return Err(SysidError::Unstable {
-                    what: "the model whose response to its initial state is fitted",
-                    radius: crate::stability::spectral_radius(f),
-                    limit: 1.0,
-                    remedy: "stabilise it first",
-                });
-            }
-            largest = largest.max(size);
-            rows.extend_from_slice(&row);
-            kept += 1;
-            next.fill(0.0);
-            for (next, row) in next.chunks_exact_mut(n).zip(row.chunks_exact(n)) {
-                // Row of C Fᵏ times F: a combination of the rows of F.
-                add_product_rows(next, &columns, row);
-            }
-            std::mem::swap(&mut row, &mut next);
-        }
+        let rows = free_rows(f, c, samples, DECAYED).ok_or_else(|| SysidError::Unstable {
+            what: "the model whose response to its initial state is fitted",
+            radius: crate::stability::spectral_radius(f),
+            limit: 1.0,
+            remedy: "stabilise it first",
+        })?;
+        let stride = stride(n);
+        let kept = rows.len().checked_div(p * stride).unwrap_or(0);
         let mut response = Self {
             n,
             p,
             kept,
+            stride,
             rows,
             basis: Mat::zeros(n, 0),
         };
@@ -213,9 +182,10 @@ impl FreeResponse {
         self.kept
     }
 
-    /// `C Fᵏ`, p×n row by row, for k below [`kept`](Self::kept).
-    pub fn at(&self, k: usize) -> &[f64] {
-        &self.rows[k * self.p * self.n..(k + 1) * self.p * self.n]
+    /// Row `l` of `C Fᵏ`, for k below [`kept`](Self::kept).
+    pub fn at(&self, k: usize, l: usize) -> &[f64] {
+        let first = (k * self.p + l) * self.stride;
+        &self.rows[first..first + self.n]
     }
 
     /// n×rank, so that `C Fᵏ basis` is orthonormal over the samples of a record.
@@ -233,11 +203,8 @@ impl FreeResponse {
         for first in (0..samples * p).step_by(BLOCK) {
             let count = BLOCK.min(samples * p - first);
             let mut block = qr.rows(count);
-            for j in 0..n {
-                for i in 0..count {
-                    block[(i, j)] = self.rows[(first + i) * n + j];
-                }
-            }
+            let rows = &self.rows[first * self.stride..(first + count) * self.stride];
+            block.copy_from(MatRef::from_row_major_slice(rows, count, self.stride).subcols(0, n));
         }
         let r = qr.triangle();
         let scales: Vec<f64> = (0..n)
@@ -262,7 +229,7 @@ impl FreeResponse {
         if n == 0 {
             return initial;
         }
-        let rows = self.rows.chunks_exact(n);
+        let rows = self.rows.chunks_exact(self.stride).map(|row| &row[..n]);
         // The second pass corrects the rounding of the first (corrected semi-normal equations).
         for _ in 0..2 {
             let mut gradient = vec![0.0; n];
@@ -281,14 +248,5 @@ impl FreeResponse {
             add_scaled(&mut initial, 1.0, &correction);
         }
         initial
-    }
-}
-
-/// `y += x F` for a row x, with `transposed` = Fᵀ.
-fn add_product_rows(y: &mut [f64], transposed: &Mat<f64>, x: &[f64]) {
-    for (i, &x) in x.iter().enumerate() {
-        for (j, y) in y.iter_mut().enumerate() {
-            *y += x * transposed[(j, i)];
-        }
     }
 }

@@ -1,5 +1,7 @@
 //! What the model is refined for.
 
+use std::cell::OnceCell;
+
 use super::candidate::{Candidate, Care, Search};
 use super::evaluate::Errors;
 use super::fits;
@@ -43,7 +45,7 @@ impl Search<'_> {
         let (mut best, mut failure): (Option<(f64, Focused)>, _) = (None, None);
         let starts = folds.iter().zip(candidates).map(|(fold, candidate)| {
             let start = self.refitted(&fold.training, candidate, Care::Rough)?;
-            Ok((fold, start))
+            Ok((fold, start, OnceCell::new()))
         });
         let starts = starts.collect::<Result<Vec<_>, SysidError>>()?;
         for &way in self.ways() {
@@ -76,13 +78,19 @@ impl Search<'_> {
     fn judged(
         &self,
         way: Way,
-        starts: &[(&Fold, Candidate)],
+        starts: &[(&Fold, Candidate, OnceCell<Candidate>)],
     ) -> Result<(f64, Vec<f64>, Vec<f64>), SysidError> {
         let part = 1.0 / starts.len() as f64;
         let (mut score, mut fit, mut prediction_fit) = (0.0, Vec::new(), Vec::new());
-        for (fold, start) in starts {
+        for (fold, start, with_gain) in starts {
             let subspace = || self.subspace(&fold.training, &fold.bases, start.model.order());
-            let model = self.along(way, &fold.training, start, subspace, Care::Rough)?;
+            let model = self.along(
+                way,
+                &fold.training,
+                (start, with_gain),
+                subspace,
+                Care::Rough,
+            )?;
             let held_out = &fold.held_out;
             let errors = Errors::of(held_out, &model.model, self.settings.steps_ahead)?;
             score += part * errors.score();
@@ -100,21 +108,28 @@ impl Search<'_> {
         Ok((score, fit, prediction_fit))
     }
 
-    /// Goes one way on these records. `subspace` gives the subspace estimates, the best first.
+    /// Goes one way on these records. The cell keeps the simulation-refined model with its gain, which two ways
+    /// start from. `subspace` gives the subspace estimates, the best first.
     pub fn along(
         &self,
         way: Way,
         data: &WorkingData,
-        simulation: &Candidate,
+        (simulation, with_gain): (&Candidate, &OnceCell<Candidate>),
         subspace: impl FnOnce() -> Result<Vec<Candidate>, SysidError>,
         care: Care,
     ) -> Result<Candidate, SysidError> {
-        let model = match way {
-            Way::Simulation => self.with_gain(data, simulation, care)?,
-            Way::Prediction => {
-                let start = self.with_gain(data, simulation, care)?;
-                self.prediction(data, &start, care)?
+        let shared = || -> Result<_, SysidError> {
+            match with_gain.get() {
+                Some(known) => Ok(known.clone()),
+                None => {
+                    let found = self.with_gain(data, simulation, care)?;
+                    Ok(with_gain.get_or_init(|| found).clone())
+                }
             }
+        };
+        let model = match way {
+            Way::Simulation => shared()?,
+            Way::Prediction => self.prediction(data, &shared()?, care)?,
             Way::Subspace => {
                 let estimates = subspace()?;
                 self.with_gain(data, estimates.first().unwrap_or(simulation), care)?

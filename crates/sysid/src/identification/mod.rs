@@ -13,6 +13,7 @@ mod report;
 mod response;
 mod settings;
 
+use std::cell::OnceCell;
 use std::ops::ControlFlow;
 
 use deepc_core::data::Dataset;
@@ -155,7 +156,8 @@ pub fn identify_with(
 
     steps.next("choosing feedthrough and focus")?;
     let found = bases(&scaled, &horizons, settings)?;
-    let mut starts = search.subspace(&all, &found, order)?;
+    let starts = search.subspace(&all, &found, order)?;
+    let first_structure = search.structure.clone();
     let mut best = search.refined(&all, &starts, Care::Rough)?;
     for candidate in &trials[chosen].candidates {
         let refitted = search.refitted(&all, candidate, Care::Rough)?;
@@ -165,13 +167,20 @@ pub fn identify_with(
     }
     if settings.feedthrough == Feedthrough::Automatic {
         best = feedthrough::eliminate(&mut search, &all, best)?;
-        starts = search.subspace(&all, &found, order)?;
     }
     let mut focused = search.focused(&folds, &trials[chosen].candidates)?;
 
     steps.next("making the model from all samples")?;
     let best = search.simulation(&all, &best, Care::Full)?;
-    let last = match search.along(focused.way, &all, &best, || Ok(starts), Care::Full) {
+    let subspace = || {
+        if search.structure == first_structure {
+            Ok(starts)
+        } else {
+            search.subspace(&all, &found, order)
+        }
+    };
+    let start = (&best, &OnceCell::new());
+    let last = match search.along(focused.way, &all, start, subspace, Care::Full) {
         Ok(last) => last,
         // The way was open on every part, but is not on the whole: the start of all ways is left.
         Err(_) if focused.way != Way::Simulation => {

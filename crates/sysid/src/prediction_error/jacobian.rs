@@ -308,7 +308,8 @@ impl<'a> Rows<'a> {
                 let e = &innovations[(k + step) * p..(k + step + 1) * p];
                 for (l, provided) in provided.iter_mut().enumerate() {
                     let column = provided.col_as_slice_mut(step);
-                    column[..n * q].copy_from_slice(bank.responses(l));
+                    let responses = column.chunks_exact_mut(q.max(1)).zip(bank.responses(l));
+                    responses.for_each(|(to, from)| to.copy_from_slice(from));
                     if layout.dynamics {
                         column[n * q..n * q + n].copy_from_slice(x);
                         column[n * q + n..].copy_from_slice(u);
@@ -355,17 +356,15 @@ impl<'a> Rows<'a> {
         l: usize,
         mut rows: MatMut<'_, f64>,
     ) {
-        let n = self.layout.n;
+        let kept = response.kept().saturating_sub(k).min(rows.nrows());
         for j in 0..basis.ncols() {
             let basis = basis.col_as_slice(j);
-            for step in 0..rows.nrows() {
-                rows[(step, j)] = if k + step < response.kept() {
-                    let free = &response.at(k + step)[l * n..(l + 1) * n];
-                    -basis.iter().zip(free).map(|(b, r)| b * r).sum::<f64>()
-                } else {
-                    0.0
-                };
+            let (top, mut rest) = rows.as_mut().col_mut(j).split_at_row_mut(kept);
+            for (step, value) in top.iter_mut().enumerate() {
+                let free = response.at(k + step, l);
+                *value = -basis.iter().zip(free).map(|(b, r)| b * r).sum::<f64>();
             }
+            rest.fill(0.0);
         }
     }
 

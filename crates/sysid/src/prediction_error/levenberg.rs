@@ -6,7 +6,7 @@ use super::balance::Basis;
 use super::jacobian::{Linearised, linearise};
 use super::limits::Limits;
 use super::parameters::Layout;
-use super::predictor::{Evaluation, ROUNDING};
+use super::predictor::{Evaluation, ROUNDING, free_response};
 use super::{Ending, OutputWeights, RefineSettings};
 use crate::error::SysidError;
 use crate::input_fit::fit_packed;
@@ -189,9 +189,13 @@ impl Descent<'_> {
         let promised = steps.promised(damping);
         let moved = self.layout.moved(model, &steps.at(damping));
         let candidate = self.limits.kept(self.layout, &moved, &run.covariance)?;
+        // B and D have no part in it: both models share it.
+        let response = free_response(self.packed, &candidate, &run.whitening).ok()?;
         let tried = |model: SystemMatrices| {
+            let (weights, weighting) = (&run.whitening, self.weighting);
             let tried =
-                Evaluation::new(self.packed, &model, &run.whitening, self.weighting).ok()?;
+                Evaluation::with_response(self.packed, &model, &response, weights, weighting)
+                    .ok()?;
             let gained = self.total * (run.criterion - tried.criterion);
             Some(Better {
                 model,
@@ -207,8 +211,17 @@ impl Descent<'_> {
                 ..
             } = self.layout;
             let (a, c, weights) = (&model.a, &model.c, &run.whitening);
-            let fitted =
-                fit_packed(self.packed, a, c, *dynamic_inputs, feedthrough, weights).ok()?;
+            // Without a gain, that of the predictor is that of A.
+            let fitted = fit_packed(
+                self.packed,
+                a,
+                c,
+                *dynamic_inputs,
+                feedthrough,
+                weights,
+                &response,
+            )
+            .ok()?;
             tried(SystemMatrices {
                 b: fitted.b,
                 d: fitted.d,

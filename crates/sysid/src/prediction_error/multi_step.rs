@@ -4,13 +4,14 @@
 //! samples are alike, and the prediction is wrong a few steps later. A controller needs those.
 
 use deepc_core::faer::linalg::solvers::Solve;
-use deepc_core::faer::{ColRef, Mat, Side};
+use deepc_core::faer::{ColRef, Mat, MatRef, Side};
 
 use super::predictor_radius;
 use crate::error::SysidError;
 use crate::input_fit::fit_initial_states;
+use crate::kernels::{Output, march};
 use crate::stability::spectral_radius;
-use crate::state_space::SystemMatrices;
+use crate::state_space::{SystemMatrices, by_sample};
 use crate::working::{WorkingData, WorkingRecord};
 
 /// Steps of Levenberg-Marquardt at most.
@@ -154,22 +155,17 @@ pub(crate) fn errors_ahead(
     steps: usize,
     mut take: impl FnMut(usize, &Mat<f64>),
 ) {
-    let (inputs, measured) = (record.inputs.as_ref(), record.outputs.as_ref());
-    let (n, p, samples) = (model.order(), model.outputs(), record.samples());
-    let mut innovations = Mat::zeros(samples, p);
-    let (mut state, mut next, mut output) = (initial.to_vec(), vec![0.0; n], vec![0.0; p]);
-    for k in 0..samples {
-        model.observe(&state, inputs, k, &mut output);
-        model.advance(&state, inputs, k, &mut next);
-        for (channel, value) in output.iter().enumerate() {
-            let innovation = measured[(k, channel)] - value;
-            innovations[(k, channel)] = innovation;
-            for (i, next) in next.iter_mut().enumerate() {
-                *next += model.k[(i, channel)] * innovation;
-            }
-        }
-        std::mem::swap(&mut state, &mut next);
-    }
+    let (p, samples) = (model.outputs(), record.samples());
+    let mut innovations = by_sample(record.outputs.as_ref());
+    march(
+        model,
+        initial,
+        &by_sample(record.inputs.as_ref()),
+        &mut innovations,
+        &mut [],
+        Output::Difference,
+    );
+    let innovations = MatRef::from_row_major_slice(&innovations, samples, p).to_owned();
     let mut errors = innovations.clone();
     let mut gain = model.k.clone();
     for k in 1..=steps {

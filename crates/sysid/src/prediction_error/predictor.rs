@@ -4,7 +4,8 @@ use deepc_core::faer::{Mat, Side};
 
 use super::OutputWeights;
 use crate::error::SysidError;
-use crate::regressors::{FreeResponse, Packed, PackedRecord, add_product};
+use crate::kernels::{Output, add_free, add_product, add_scaled, march};
+use crate::regressors::{FreeResponse, Packed, PackedRecord};
 use crate::state_space::SystemMatrices;
 
 /// Variance, of outputs with variance 1, below which innovations are rounding.
@@ -35,28 +36,39 @@ impl Evaluation {
         whitening: &Mat<f64>,
         weighting: OutputWeights,
     ) -> Result<Self, SysidError> {
-        let (n, p) = (model.order(), packed.outputs);
+        let response = free_response(packed, model, whitening)?;
+        Self::with_response(packed, model, &response, whitening, weighting)
+    }
+
+    /// The same for a free response that is known: [`free_response`] of this model and `whitening`.
+    pub fn with_response(
+        packed: &Packed,
+        model: &SystemMatrices,
+        response: &FreeResponse,
+        whitening: &Mat<f64>,
+        weighting: OutputWeights,
+    ) -> Result<Self, SysidError> {
+        let p = packed.outputs;
         let f = model.predictor();
-        let response = FreeResponse::new(
-            f.as_ref(),
-            (whitening * &model.c).as_ref(),
-            packed.longest(),
-        )?;
-        let unobserved = Unweighted::new(&f, model, response.kept());
+        let c = -&model.c;
         let (mut states, mut innovations, mut initial) = (Vec::new(), Vec::new(), Vec::new());
-        let mut covariance = Mat::zeros(p, p);
+        let mut sums = vec![0.0; p * p];
         for record in &packed.records {
             let (mut x, mut e) = run(record, model);
             let mut weighted = vec![0.0; e.len()];
-            for (weighted, e) in weighted.chunks_exact_mut(p).zip(e.chunks_exact(p)) {
-                add_product(weighted, whitening, e);
+            if p == 1 {
+                add_scaled(&mut weighted, whitening[(0, 0)], &e);
+            } else {
+                for (weighted, e) in weighted.chunks_exact_mut(p).zip(e.chunks_exact(p)) {
+                    add_product(weighted, whitening, e);
+                }
             }
             let start = response.take_off(&mut weighted, &response.basis(record.samples)?);
-            unobserved.add(&start, &mut x, &mut e, n, p);
+            add_free(&f, &c, &start, response.kept(), &mut x, &mut e);
             for e in e.chunks_exact(p) {
-                for i in 0..p {
-                    for j in 0..=i {
-                        covariance[(i, j)] += e[i] * e[j];
+                for (sums, e_i) in sums.chunks_exact_mut(p).zip(e) {
+                    for (sum, e_j) in sums.iter_mut().zip(e) {
+                        *sum += e_i * e_j;
                     }
                 }
             }
@@ -65,12 +77,7 @@ impl Evaluation {
             initial.push(start);
         }
         let samples = packed.samples().max(1) as f64;
-        for i in 0..p {
-            for j in 0..=i {
-                covariance[(i, j)] /= samples;
-                covariance[(j, i)] = covariance[(i, j)];
-            }
-        }
+        let covariance = Mat::from_fn(p, p, |i, j| sums[i * p + j] / samples);
         let (whitening, criterion) = weights(&covariance, weighting)?;
         Ok(Self {
             states,
@@ -81,6 +88,16 @@ impl Evaluation {
             criterion,
         })
     }
+}
+
+/// The response `W C Fᵏ` to the initial states, F = A − KC.
+pub(super) fn free_response(
+    packed: &Packed,
+    model: &SystemMatrices,
+    whitening: &Mat<f64>,
+) -> Result<FreeResponse, SysidError> {
+    let (f, c) = (model.predictor(), whitening * &model.c);
+    FreeResponse::new(f.as_ref(), c.as_ref(), packed.longest())
 }
 
 /// W and the criterion: log det (Ljung 1999, chapter 7) or the logarithm of the mean variance.
@@ -116,56 +133,16 @@ fn weights(covariance: &Mat<f64>, weighting: OutputWeights) -> Result<(Mat<f64>,
 
 /// States and innovations from x(0) = 0.
 fn run(record: &PackedRecord, model: &SystemMatrices) -> (Vec<f64>, Vec<f64>) {
-    let (n, m, p) = (model.order(), model.inputs(), model.outputs());
-    let (c, d) = (-&model.c, -&model.d);
-    let mut states = vec![0.0; (record.samples + 1) * n];
+    let n = model.order();
+    let mut states = vec![0.0; record.samples * n];
     let mut innovations = record.outputs.clone();
-    for (k, e) in innovations.chunks_exact_mut(p).enumerate() {
-        let u = &record.inputs[k * m..(k + 1) * m];
-        let (past, future) = states.split_at_mut((k + 1) * n);
-        let (x, next) = (&past[k * n..], &mut future[..n]);
-        add_product(e, &c, x);
-        add_product(e, &d, u);
-        add_product(next, &model.a, x);
-        add_product(next, &model.b, u);
-        add_product(next, &model.k, e);
-    }
-    states.truncate(record.samples * n);
+    march(
+        model,
+        &vec![0.0; n],
+        &record.inputs,
+        &mut innovations,
+        &mut states,
+        Output::Residual,
+    );
     (states, innovations)
-}
-
-/// The free motion `x(k+1) = F x(k)`, e = −C x, until it has decayed.
-struct Unweighted<'a> {
-    f: &'a Mat<f64>,
-    c: Mat<f64>,
-    samples: usize,
-}
-
-impl<'a> Unweighted<'a> {
-    fn new(f: &'a Mat<f64>, model: &SystemMatrices, samples: usize) -> Self {
-        Self {
-            f,
-            c: -&model.c,
-            samples,
-        }
-    }
-
-    fn add(&self, start: &[f64], states: &mut [f64], innovations: &mut [f64], n: usize, p: usize) {
-        if n == 0 {
-            return;
-        }
-        let (mut free, mut next) = (start.to_vec(), vec![0.0; n]);
-        let samples = states
-            .chunks_exact_mut(n)
-            .zip(innovations.chunks_exact_mut(p));
-        for (x, e) in samples.take(self.samples) {
-            for (x, free) in x.iter_mut().zip(&free) {
-                *x += free;
-            }
-            add_product(e, &self.c, &free);
-            next.fill(0.0);
-            add_product(&mut next, self.f, &free);
-            std::mem::swap(&mut free, &mut next);
-        }
-    }
 }

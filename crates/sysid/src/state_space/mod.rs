@@ -19,6 +19,7 @@ use crate::error::SysidError;
 
 pub use initial_state::InitialStateFor;
 pub use poles::Mode;
+pub(crate) use simulate::by_sample;
 
 /// One signal of a model: its name, the offset that the matrices do not see, and its typical size.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
