@@ -225,7 +225,7 @@ fn none_does_not_see_units_but_sees_a_shift() {
 
 #[test]
 fn a_file_names_the_choice_or_leaves_it_out() {
-    let read = serde_json::from_str::<IdentificationSettings>;
+    let read = |text: &str| serde_json::from_str::<IdentificationSettings>(text);
     assert_eq!(read("{}").unwrap().offsets, OffsetChoice::Found);
     for (word, choice) in [
         ("found", OffsetChoice::Found),
