@@ -20,10 +20,11 @@ const FIGURES: [&str; 2] = ["iso-7401-step", "tilt-table"];
 const CIRCLE: &str = "iso-4138-constant-speed";
 /// Whether an embedded vehicle should lift two wheels in a rollover test on a road of 0.85: laden
 /// ones do, the negative controls do not.
-const SHOULD_LIFT: [(&str, bool); 5] = [
+const SHOULD_LIFT: [(&str, bool); 6] = [
     ("sedan", true),
     ("sedan-unladen", false),
     ("utility-truck", true),
+    ("utility-truck-laden", true),
     ("suv", true),
     ("hmmwv", false),
 ];

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::Result;
-use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 
 use crate::output::print_text;
@@ -148,6 +148,9 @@ pub struct PaperArgs {
     /// Scenarios; by default all of the paper.
     #[arg(long, value_name = "SCENARIO,…", value_delimiter = ',', value_parser = paper_scenario)]
     pub only: Vec<String>,
+    /// Controllers; by default all of every scenario.
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
+    pub controllers: Vec<String>,
     /// Folder for the results.
     #[arg(long, default_value = "out/paper", value_name = "DIR")]
     pub out: PathBuf,
@@ -186,9 +189,10 @@ pub struct RunArgs {
     /// Vehicle file or name, instead of the scenario's.
     #[arg(long, value_name = "VEHICLE")]
     pub vehicle: Option<String>,
-    /// Recording to work from, instead of making one from the seed.
-    #[arg(long, value_name = "FILE")]
-    pub recording: Option<PathBuf>,
+    /// Recording to work from, instead of making one from the seed: a file for each record, separated
+    /// by commas or each with its own --recording.
+    #[arg(long, value_delimiter = ',', value_name = "FILE,…")]
+    pub recording: Vec<PathBuf>,
     /// Terrain file that `terrain` wrote, or map of measured heights (`.npz`, `.csv`), instead of the
     /// scenario's ground.
     #[arg(long, value_name = "FILE")]
@@ -232,7 +236,7 @@ pub struct RecordArgs {
     /// Seed of the noise on the inputs.
     #[arg(long, default_value_t = 10)]
     pub seed: u64,
-    /// Folder for `recording.csv`; by default `out/SCENARIO`.
+    /// Folder for `recording.csv`, and `recording-2.csv` and so on where there are more records; by default `out/SCENARIO`.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Vehicle file or name, instead of the scenario's.
@@ -277,6 +281,9 @@ pub struct IdentifyArgs {
     /// Inputs whose effect is held at zero, because the data do not identify it.
     #[arg(long, value_delimiter = ',', value_name = "COLUMN,…")]
     pub without_effect: Vec<String>,
+    /// What is taken from the channels, so that the model is one of deviations.
+    #[arg(long, value_enum, default_value = "found", value_name = "HOW")]
+    pub offsets: Offsets,
     /// Recordings that judge the model; by default it is judged on those it was made from.
     #[arg(long, value_delimiter = ',', value_name = "RECORDING,…")]
     pub validate: Vec<PathBuf>,
@@ -289,6 +296,27 @@ pub struct IdentifyArgs {
     /// Print the report as JSON on standard output.
     #[arg(long)]
     pub json: bool,
+}
+
+/// What is taken from the channels before a model is made of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Offsets {
+    /// Means, and a constant per output that is estimated with the model.
+    Found,
+    /// Means, nothing else.
+    Means,
+    /// Nothing: the model goes through the origin.
+    None,
+}
+
+impl From<Offsets> for sysid::OffsetChoice {
+    fn from(offsets: Offsets) -> Self {
+        match offsets {
+            Offsets::Found => Self::Found,
+            Offsets::Means => Self::Means,
+            Offsets::None => Self::None,
+        }
+    }
 }
 
 /// Arguments of `manoeuvre`.

@@ -1,6 +1,8 @@
 //! Recording the data the controllers work from: the paper's recipe.
 
-use std::path::Path;
+use std::borrow::Cow;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use deepc_core::controller::Plant;
@@ -12,12 +14,13 @@ use rand_distr::{Distribution, Normal};
 use serde::Serialize;
 use vehicle_dyn::metrics::Outcome;
 use vehicle_dyn::parameters::VehicleParameters;
+use vehicle_dyn::sensors::derived_seed;
 
 use crate::closed_loop::{DrivenVehicle, INPUTS, OUTPUTS};
 use crate::interrupt::Interrupt;
 use crate::output::write_whole;
 use crate::progress;
-use crate::scenario::Scenario;
+use crate::scenario::{RecordRecipe, Scenario};
 use crate::terrain;
 
 /// Names of the input columns of a recording.
@@ -27,7 +30,7 @@ pub const OUTPUT_COLUMNS: [&str; 1] = ["ltr"];
 /// Name of the time column of a recording.
 pub const TIME_COLUMN: &str = "time_s";
 
-/// What a recording came to.
+/// What a recording came to, over all its records.
 #[derive(Debug, Clone, Serialize)]
 pub struct RecordingSummary {
     /// Name of the scenario.
@@ -44,9 +47,27 @@ pub struct RecordingSummary {
     pub ltr_abs_max: f64,
     /// Largest distance from the centre line, m.
     pub path_deviation_max_m: f64,
+    /// The records one by one, where there are several.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub records: Vec<RecordSummary>,
 }
 
-/// Drives the scenario's recording course with noise on both inputs.
+/// What one record came to.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct RecordSummary {
+    /// Seed of its noise.
+    pub seed: u64,
+    /// Samples recorded.
+    pub samples: usize,
+    /// Samples of the LTR that the sensor lost.
+    pub ltr_filled_samples: usize,
+    /// Largest true |LTR|.
+    pub ltr_abs_max: f64,
+    /// Largest distance from the centre line, m.
+    pub path_deviation_max_m: f64,
+}
+
+/// Drives the scenario's recording courses with noise on both inputs: one record each.
 ///
 /// # Errors
 /// When the vehicle cannot be simulated or does not stay on its wheels and on the road.
@@ -56,12 +77,55 @@ pub fn record(
     seed: u64,
     interrupt: &Interrupt,
 ) -> Result<(Dataset, RecordingSummary)> {
-    let recipe = &scenario.recording;
-    let terrain = terrain::build(scenario.recording_ground(), &recipe.course, interrupt)?;
+    let mut dataset = Dataset::new(scenario.sample_time_s, INPUT_COLUMNS, OUTPUT_COLUMNS)?;
+    let mut records = Vec::new();
+    for (index, recipe) in scenario.records().iter().enumerate() {
+        let order = (recipe, index + 1, record_seed(seed, index + 1));
+        let (inputs, outputs, summary) = drive(scenario, vehicle, order, interrupt)?;
+        dataset.push_record(inputs, outputs)?;
+        records.push(summary);
+    }
+    let largest = |of: fn(&RecordSummary) -> f64| records.iter().map(of).fold(0.0, f64::max);
+    let summary = RecordingSummary {
+        scenario: scenario.name.clone(),
+        vehicle: vehicle.name.clone(),
+        seed,
+        samples: dataset.samples(),
+        ltr_filled_samples: records.iter().map(|r| r.ltr_filled_samples).sum(),
+        ltr_abs_max: largest(|r| r.ltr_abs_max),
+        path_deviation_max_m: largest(|r| r.path_deviation_max_m),
+        records: if records.len() > 1 {
+            records
+        } else {
+            Vec::new()
+        },
+    };
+    Ok((dataset, summary))
+}
+
+/// Seed of a record, counted from 1: that of the recording for the first, one derived from it for
+/// the others.
+#[must_use]
+pub fn record_seed(seed: u64, number: usize) -> u64 {
+    if number == 1 {
+        seed
+    } else {
+        derived_seed(seed, &format!("record {number}"))
+    }
+}
+
+/// Drives the record of a recipe, number (from 1) and seed: inputs, outputs and what it came to.
+fn drive(
+    scenario: &Scenario,
+    vehicle: &VehicleParameters,
+    (recipe, number, seed): (&RecordRecipe<'_>, usize, u64),
+    interrupt: &Interrupt,
+) -> Result<(Mat<f64>, Mat<f64>, RecordSummary)> {
+    let terrain = terrain::build(recipe.ground, recipe.course, interrupt)?;
     let mut plant = DrivenVehicle::new(
         scenario,
         vehicle,
-        &recipe.course,
+        recipe.course,
         terrain,
         recipe.target_speed_kmh,
         (seed, "recording"),
@@ -69,11 +133,15 @@ pub fn record(
     let mut noise = ChaCha8Rng::seed_from_u64(seed);
     let steering_noise = normal(recipe.steering_wheel_noise_deg)?;
     let speed_noise = normal(recipe.target_speed_noise_kmh)?;
-    let samples = scenario.recording_samples();
+    let samples = recipe.samples(scenario.sample_time_s);
     let mut inputs: Vec<[f64; INPUTS]> = Vec::with_capacity(samples);
     let mut measured: Vec<f64> = Vec::with_capacity(samples);
     let mut ltr_abs_max = 0.0_f64;
     let mut deviation_m = 0.0_f64;
+    let what = match number {
+        1 => "the recording".to_owned(),
+        _ => format!("record {number} of the recording"),
+    };
     let bar = progress::bar(samples, "recording");
     for _ in 0..samples {
         interrupt.check("while recording", "no recording was written")?;
@@ -89,29 +157,48 @@ pub fn record(
         deviation_m = deviation_m.max(plant.location().lateral_offset_m.abs());
         anyhow::ensure!(
             plant.outcome() == Outcome::Completed,
-            "the vehicle did not survive the recording: {} at {:.2} s with seed {seed}; record at a lower target speed or on wider turns",
+            "the vehicle did not survive {what}: {} at {:.2} s with seed {seed}; record at a lower target speed or on wider turns",
             plant.outcome(),
             plant.observation().time_s,
         );
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let summary = RecordingSummary {
-        scenario: scenario.name.clone(),
-        vehicle: vehicle.name.clone(),
+    let summary = RecordSummary {
         seed,
         samples,
-        ltr_filled_samples: fill_gaps(&mut measured)
-            .context("the LTR sensor lost every sample of the recording: lower its drop-outs")?,
+        ltr_filled_samples: fill_gaps(&mut measured).with_context(|| {
+            format!("the LTR sensor lost every sample of {what}: lower its drop-outs")
+        })?,
         ltr_abs_max,
         path_deviation_max_m: deviation_m,
     };
-    let mut dataset = Dataset::new(scenario.sample_time_s, INPUT_COLUMNS, OUTPUT_COLUMNS)?;
-    dataset.push_record(
+    Ok((
         Mat::from_fn(samples, INPUTS, |k, i| inputs[k][i]),
         Mat::from_fn(samples, OUTPUTS, |k, _| measured[k]),
-    )?;
-    Ok((dataset, summary))
+        summary,
+    ))
+}
+
+/// The first `count` records of a recording, or all of them.
+///
+/// # Errors
+/// When it has fewer.
+pub fn first_records(dataset: &Dataset, count: Option<usize>) -> Result<Cow<'_, Dataset>> {
+    let found = dataset.records().len();
+    let count = count.unwrap_or(found);
+    anyhow::ensure!(
+        (1..=found).contains(&count),
+        "the controller works from {count} records (its `records`), but the recording has {found}"
+    );
+    if count == found {
+        return Ok(Cow::Borrowed(dataset));
+    }
+    let mut first = Dataset::new(dataset.sample_time_s(), INPUT_COLUMNS, OUTPUT_COLUMNS)?;
+    for record in &dataset.records()[..count] {
+        first.push_record(record.inputs().to_owned(), record.outputs().to_owned())?;
+    }
+    Ok(Cow::Owned(first))
 }
 
 /// Fills what is not finite by straight lines between the values around it, and before the first
@@ -139,24 +226,49 @@ fn normal(standard_deviation: f64) -> Result<Normal<f64>> {
     Normal::new(0.0, standard_deviation).context("the recording's noise has no finite deviation")
 }
 
-/// Writes a recording as CSV.
+/// Writes a recording as CSV: the first record to `path`, `recording.csv` for example, the others
+/// beside it, to `recording-2.csv` and so on. Those that an earlier, longer recording left there are
+/// removed. Returns the files.
 ///
 /// # Errors
-/// When the file cannot be written.
-pub fn write(path: &Path, dataset: &Dataset) -> Result<()> {
-    let mut text = Vec::new();
-    dataset.write_csv_to(1, &mut text, &path.display().to_string(), TIME_COLUMN)?;
-    write_whole(
-        path,
-        &String::from_utf8(text).context("channel names are UTF-8")?,
-    )
+/// When a file cannot be written or removed.
+pub fn write(path: &Path, dataset: &Dataset) -> Result<Vec<PathBuf>> {
+    let records = dataset.records().len();
+    let files: Vec<PathBuf> = (1..=records).map(|n| numbered(path, n)).collect();
+    for (index, file) in files.iter().enumerate() {
+        let mut text = Vec::new();
+        let name = file.display().to_string();
+        dataset.write_csv_to(index + 1, &mut text, &name, TIME_COLUMN)?;
+        write_whole(
+            file,
+            &String::from_utf8(text).context("channel names are UTF-8")?,
+        )?;
+    }
+    for number in records + 1.. {
+        let old = numbered(path, number);
+        match std::fs::remove_file(&old) {
+            Ok(()) => {}
+            Err(e) if e.kind() == ErrorKind::NotFound => break,
+            Err(e) => return Err(e).with_context(|| format!("cannot remove {}", old.display())),
+        }
+    }
+    Ok(files)
 }
 
-/// Reads a recording with the scenario's sample time.
+/// File of a record, counted from 1.
+fn numbered(path: &Path, number: usize) -> PathBuf {
+    if number == 1 {
+        return path.to_owned();
+    }
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    path.with_file_name(format!("{stem}-{number}.csv"))
+}
+
+/// Reads a recording with the scenario's sample time, one record per file.
 ///
 /// # Errors
-/// When the file is missing, malformed, or lacks a column; the message names the place.
-pub fn read(path: &Path, scenario: &Scenario) -> Result<Dataset> {
+/// When a file is missing, malformed, or lacks a column; the message names the place.
+pub fn read(files: &[PathBuf], scenario: &Scenario) -> Result<Dataset> {
     let layout = CsvLayout {
         time: Some(TIME_COLUMN.to_owned()),
         inputs: INPUT_COLUMNS.map(str::to_owned).to_vec(),
@@ -165,7 +277,7 @@ pub fn read(path: &Path, scenario: &Scenario) -> Result<Dataset> {
         outputs_measured: OutputTiming::EndOfInterval,
         sample_time_s: scenario.sample_time_s,
     };
-    Dataset::read_csv(&layout, &[path]).context("the recording cannot be used")
+    Dataset::read_csv(&layout, files).context("the recording cannot be used")
 }
 
 #[cfg(test)]

@@ -40,13 +40,11 @@ fn drive(name: &str, seed: u64, speed_reference_kmh: f64) -> Finished {
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
     let log: &Path = &folder.path().join("log.csv");
     let order = Run {
-        scenario: &scenario,
-        vehicle: &vehicle,
-        terrain: Terrain::flat(scenario.ground.friction),
         speed_reference_kmh,
-        seed,
         fixed_target_speed_kmh: speed_reference_kmh,
+        seed,
         controller,
+        ..Run::of_driver(&scenario, &vehicle, Terrain::flat(scenario.ground.friction))
     };
     run(order, Some(log), &Interrupt::default(), || ()).expect("the simulation runs")
 }

@@ -55,14 +55,11 @@ fn drive(
     controller: Option<Box<dyn Controller>>,
     log: &Path,
 ) -> anyhow::Result<Finished> {
+    let vehicle = vehicle(scenario);
     let order = Run {
-        scenario,
-        vehicle: &vehicle(scenario),
-        speed_reference_kmh: scenario.speed_reference_kmh,
         seed,
-        terrain: Terrain::flat(scenario.ground.friction),
-        fixed_target_speed_kmh: scenario.speed_reference_kmh,
         controller,
+        ..Run::of_driver(scenario, &vehicle, Terrain::flat(scenario.ground.friction))
     };
     run(order, Some(log), &Interrupt::default(), || ())
 }

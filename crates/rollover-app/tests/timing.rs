@@ -44,13 +44,9 @@ fn drive(scenario: &Scenario, recorded: &Recorded<'_>, name: &str, folder: &Path
     );
     let terrain = terrain::build(&scenario.ground, &scenario.course, &interrupt);
     let run = Run {
-        scenario,
-        vehicle: &vehicle,
-        terrain: terrain.expect("the ground is good"),
-        speed_reference_kmh: scenario.speed_reference_kmh,
         seed: SEED,
-        fixed_target_speed_kmh: scenario.speed_reference_kmh,
         controller: Some(built.expect("the recording is good").controller),
+        ..Run::of_driver(scenario, &vehicle, terrain.expect("the ground is good"))
     };
     let log = folder.join(format!("{name}.csv"));
     let finished = closed_loop::run(run, Some(&log), &interrupt, || {}).expect("it runs");

@@ -76,7 +76,7 @@ mod working;
 pub use error::SysidError;
 pub use identification::{
     EffectVerdict, Feedthrough, FocusChoice, Identification, IdentificationReport,
-    IdentificationSettings, InputEffect, OrderTrial, Progress, UNIDENTIFIED_RATIO,
+    IdentificationSettings, InputEffect, OffsetChoice, OrderTrial, Progress, UNIDENTIFIED_RATIO,
     UNIDENTIFIED_RESPONSE_RATIO, UncertainResponse, identify, identify_with,
 };
 pub use kalman::GainFallback;

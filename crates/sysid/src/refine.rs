@@ -31,7 +31,9 @@ pub struct RefinedModel {
 
 /// Refines a model by prediction errors on a recording: Levenberg-Marquardt on the innovation form.
 ///
-/// A, B, C and the offsets of the outputs are free as `focus` says. Columns of B or D that are zero stay
+/// A, B, C and the offsets of the outputs are free as `focus` says: a model whose offsets are to stay as they
+/// are comes from [`identify_with`](crate::identify_with) with another
+/// [`OffsetChoice`](crate::OffsetChoice). Columns of B or D that are zero stay
 /// zero: an input without effect keeps having none, and feedthrough is not introduced.
 ///
 /// ```

@@ -14,6 +14,15 @@ const CONSTANT_TOLERANCE: f64 = 1e-12;
 /// Scales whose squares, the variances, neither overflow nor vanish.
 const SCALES: RangeInclusive<f64> = 1e-150..=1e150;
 
+/// What deviations are from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Centre {
+    /// The means over all records.
+    Means,
+    /// Zero.
+    Origin,
+}
+
 /// The records of a data set as scaled deviations.
 #[derive(Debug, Clone)]
 pub(crate) struct WorkingData {
@@ -44,6 +53,11 @@ impl WorkingRecord {
 impl WorkingData {
     /// Offsets are the means over all records, scales the standard deviations.
     pub fn new(data: &Dataset) -> Result<Self, SysidError> {
+        Self::about(data, Centre::Means)
+    }
+
+    /// Offsets are those of `centre`, scales the root mean squares of the deviations from them.
+    pub fn about(data: &Dataset, centre: Centre) -> Result<Self, SysidError> {
         if data.records().is_empty() {
             return Err(SysidError::TooShort {
                 longest: 0,
@@ -68,12 +82,12 @@ impl WorkingData {
             ),
         ] {
             for (index, name) in names.iter().enumerate() {
-                inputs.push(channel(kind, name, index, &series)?);
+                inputs.push(channel(kind, name, index, &series, centre)?);
             }
         }
         let series = all(data, deepc_core::data::Record::outputs);
         let outputs = data.output_names().iter().enumerate();
-        let outputs = outputs.map(|(index, name)| channel("output", name, index, &series));
+        let outputs = outputs.map(|(index, name)| channel("output", name, index, &series, centre));
         let outputs = outputs.collect::<Result<Vec<_>, _>>()?;
         Ok(Self::with_channels(data, inputs, outputs))
     }
@@ -128,7 +142,7 @@ impl WorkingData {
     }
 
     /// The same records with one more input that is always 1: its D is an offset of the outputs that
-    /// the means of the channels did not take.
+    /// the offsets of the channels did not take.
     pub fn with_constant(&self) -> Self {
         let records = self.records.iter().map(|record| {
             let inputs = &record.inputs;
@@ -203,12 +217,13 @@ fn channel(
     name: &str,
     index: usize,
     series: &[MatRef<'_, f64>],
+    centre: Centre,
 ) -> Result<Channel, SysidError> {
     let values = || series.iter().flat_map(|s| s.col(index).iter().copied());
     let samples = series.iter().map(MatRef::nrows).sum::<usize>() as f64;
     let mean = values().sum::<f64>() / samples;
     // The mean of the deviations corrects the rounding of the first mean.
-    let offset = mean + values().map(|value| value - mean).sum::<f64>() / samples;
+    let mean = mean + values().map(|value| value - mean).sum::<f64>() / samples;
     let out_of_range = |found| SysidError::Channel {
         field: "the size",
         channel: name.to_owned(),
@@ -216,23 +231,29 @@ fn channel(
         allowed: "its variance must be in the range of numbers: choose a unit in which it is between \
                   1e-150 and 1e150",
     };
-    if !offset.is_finite() {
-        return Err(out_of_range(offset));
+    if !mean.is_finite() {
+        return Err(out_of_range(mean));
     }
-    let largest = values()
-        .map(|value| (value - offset).abs())
-        .fold(0.0, f64::max);
-    if largest <= CONSTANT_TOLERANCE * offset.abs() || largest == 0.0 {
+    let largest_about = |centre: f64| {
+        let sizes = values().map(|value| (value - centre).abs());
+        sizes.fold(0.0, f64::max)
+    };
+    let largest = largest_about(mean);
+    if largest <= CONSTANT_TOLERANCE * mean.abs() || largest == 0.0 {
         return Err(SysidError::Constant {
             kind,
             channel: name.to_owned(),
-            value: offset,
+            value: mean,
             remedy: match kind {
                 "output" => "check its sensor and record again",
                 _ => "shake it while recording, or leave it out",
             },
         });
     }
+    let (offset, largest) = match centre {
+        Centre::Means => (mean, largest),
+        Centre::Origin => (0.0, largest_about(0.0)),
+    };
     // Over the largest first, so that squares of tiny or huge deviations stay in range.
     let squares = values().map(|value| ((value - offset) / largest).powi(2));
     let scale = largest * (squares.sum::<f64>() / samples).sqrt();

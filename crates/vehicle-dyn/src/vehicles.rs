@@ -13,6 +13,10 @@ const EMBEDDED: &[(&str, &str)] = &[
         "utility-truck",
         include_str!("../../../vehicles/utility-truck.toml"),
     ),
+    (
+        "utility-truck-laden",
+        include_str!("../../../vehicles/utility-truck-laden.toml"),
+    ),
     ("suv", include_str!("../../../vehicles/suv.toml")),
     ("hmmwv", include_str!("../../../vehicles/hmmwv.toml")),
 ];

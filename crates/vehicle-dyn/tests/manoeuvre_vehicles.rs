@@ -11,10 +11,14 @@ use vehicle_dyn::parameters::VehicleParameters;
 /// The rollover tests in which each embedded vehicle lifts both wheels of one side. The negative controls
 /// lift in none, the laden vehicles in one at least. The truck keeps its wheels down in the J-turn: on a
 /// road of 0.85 it slides first, and only the reversal of a fishhook tips it.
-const LIFTS_TWO_WHEELS: [(&str, &[&str]); 5] = [
+const LIFTS_TWO_WHEELS: [(&str, &[&str]); 6] = [
     ("sedan", &["j-turn", "fishhook-1a", "fishhook-1b"]),
     ("sedan-unladen", &[]),
     ("utility-truck", &["fishhook-1a", "fishhook-1b"]),
+    (
+        "utility-truck-laden",
+        &["j-turn", "fishhook-1a", "fishhook-1b"],
+    ),
     ("suv", &["j-turn", "fishhook-1a", "fishhook-1b"]),
     ("hmmwv", &[]),
 ];

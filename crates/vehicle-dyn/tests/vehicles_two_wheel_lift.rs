@@ -208,7 +208,7 @@ fn the_hmmwv_keeps_its_wheels_down_whatever_the_driver_does() {
 
 #[test]
 fn laden_vehicles_lift_two_wheels() {
-    for name in ["sedan", "suv", "utility-truck"] {
+    for name in ["sedan", "suv", "utility-truck", "utility-truck-laden"] {
         let vehicle = vehicles::embedded(name).expect("valid");
         let [j_turn, fishhook] = nhtsa(&vehicle);
         let worst = j_turn.or(fishhook);

@@ -8,14 +8,14 @@ use sysid::{Identification, Progress};
 use vehicle_dyn::parameters::VehicleParameters;
 use vehicle_dyn::terrain::Terrain;
 
-use crate::closed_loop::{self, Built, Recorded, Run, Watch};
+use crate::closed_loop::{self, Built, Recorded, Run, SteeringProfile, Watch};
 use crate::interrupt::Interrupt;
 use crate::output::{create_folder, write_json, write_whole};
 use crate::progress;
 use crate::report::{
     self, FAILURE_FILE, LOG_FILE, REPORT_FILE, SCENE_FILE, SUMMARY_FILE, SceneFile,
 };
-use crate::scenario::Scenario;
+use crate::scenario::{ReferenceAhead, Scenario};
 use crate::summary::{ModelSummary, RunIdentity, Summary};
 
 /// What tells that a run's results are those of the same program and settings.
@@ -36,7 +36,7 @@ pub(crate) struct Job<'a> {
     pub(crate) mirrored: bool,
     pub(crate) speed_reference_kmh: f64,
     pub(crate) recorded: Option<&'a Recorded<'a>>,
-    pub(crate) recording: Option<&'a Path>,
+    pub(crate) recording: &'a [PathBuf],
     /// Whether its log is kept, and all that goes with a log; without, only the summary is.
     pub(crate) logged: bool,
     pub(crate) out: PathBuf,
@@ -86,7 +86,18 @@ impl Job<'_> {
         if self.logged {
             self.describe(identification.as_deref())?;
         }
+        let settings = self.scenario.controller(self.controller)?;
+        let preview = match settings.map(|s| s.reference) {
+            Some(ReferenceAhead::Preview) => Some(SteeringProfile::record(
+                self.scenario,
+                self.vehicle,
+                &self.terrain,
+                self.seed,
+            )?),
+            _ => None,
+        };
         let run = Run {
+            preview,
             scenario: self.scenario,
             vehicle: self.vehicle,
             terrain: self.terrain.clone(),
@@ -99,7 +110,6 @@ impl Job<'_> {
         };
         let to = self.logged.then_some(log.as_path());
         let finished = closed_loop::run(run, to, interrupt, || bar.inc(1))?;
-        let settings = self.scenario.controller(self.controller)?;
         let summary = Summary::of_log(
             RunIdentity {
                 scenario: self.scenario.name.clone(),
@@ -108,7 +118,10 @@ impl Job<'_> {
                 seed: self.seed,
                 mirrored: self.mirrored,
                 turns_m: self.scenario.course.turns_m(),
-                recording: self.recording.map(|file| file.display().to_string()),
+                recording: (!self.recording.is_empty()).then(|| {
+                    let files = self.recording.iter().map(|file| file.display().to_string());
+                    files.collect::<Vec<_>>().join(", ")
+                }),
                 speed_reference_kmh: self.speed_reference_kmh,
                 target_speed_bounds_kmh: settings.map(|_| self.scenario.bounds.target_speed_kmh),
                 model: identification.map(|i| ModelSummary::of_report(&i.report)),
@@ -132,8 +145,13 @@ impl Job<'_> {
         if let Some(identification) = identification {
             write_identification(&self.out, identification)?;
         }
-        let mut described =
-            SceneFile::new(self.scenario, self.vehicle, self.controller, self.seed)?;
+        let mut described = SceneFile::new(
+            self.scenario,
+            self.vehicle,
+            self.controller,
+            self.seed,
+            Some(&self.terrain),
+        )?;
         described.run.mirrored = self.mirrored;
         write_whole(
             &self.out.join(SCENE_FILE),

@@ -19,6 +19,9 @@ use crate::summary::Summary;
 use crate::terrain;
 use job::{Job, step_bar};
 
+/// Name of the first record's file.
+pub(crate) const RECORDING: &str = "recording.csv";
+
 /// `run`: one controller on one scenario.
 ///
 /// # Errors
@@ -49,10 +52,10 @@ pub fn single(args: &RunArgs, interrupt: &Interrupt) -> Result<()> {
         .clone()
         .unwrap_or_else(|| default_folder(&scenario).join(&args.controller));
     create_folder(&out)?;
-    let data = match (settings, &args.recording) {
+    let data = match (settings, args.recording.as_slice()) {
         (None, _) => None,
-        (Some(_), Some(file)) => Some(record::read(file, &scenario)?),
-        (Some(_), None) => Some(recording(&scenario, &vehicle, args.seed, &out, interrupt)?),
+        (Some(_), files @ [_, ..]) => Some(record::read(files, &scenario)?),
+        (Some(_), []) => Some(recording(&scenario, &vehicle, args.seed, &out, interrupt)?),
     };
     let recorded = data.as_ref().map(Recorded::new);
     let job = Job {
@@ -64,7 +67,11 @@ pub fn single(args: &RunArgs, interrupt: &Interrupt) -> Result<()> {
         mirrored: args.mirror,
         speed_reference_kmh,
         recorded: recorded.as_ref(),
-        recording: args.recording.as_deref().filter(|_| recorded.is_some()),
+        recording: if recorded.is_some() {
+            &args.recording
+        } else {
+            &[]
+        },
         logged: true,
         out,
     };
@@ -105,20 +112,25 @@ pub fn record_only(args: &RecordArgs, interrupt: &Interrupt) -> Result<()> {
         .unwrap_or_else(|| default_folder(&scenario));
     create_folder(&out)?;
     let (dataset, summary) = record(&scenario, &vehicle, args.seed, interrupt)?;
-    let path = out.join("recording.csv");
-    record::write(&path, &dataset)?;
+    let files = record::write(&out.join(RECORDING), &dataset)?;
     write_json(&out.join("recording.json"), &summary)?;
     if args.json {
-        print_json(&summary)
-    } else {
-        print_line(&format!(
-            "{}: {} samples, max |LTR| {:.3}, at most {:.2} m off the path",
-            path.display(),
-            summary.samples,
-            summary.ltr_abs_max,
-            summary.path_deviation_max_m
-        ))
+        return print_json(&summary);
     }
+    let line = |file: &Path, samples: usize, ltr: f64, deviation_m: f64| {
+        print_line(&format!(
+            "{}: {samples} samples, max |LTR| {ltr:.3}, at most {deviation_m:.2} m off the path",
+            file.display()
+        ))
+    };
+    let s = &summary;
+    if let ([file], []) = (files.as_slice(), s.records.as_slice()) {
+        return line(file, s.samples, s.ltr_abs_max, s.path_deviation_max_m);
+    }
+    for (file, r) in files.iter().zip(&s.records) {
+        line(file, r.samples, r.ltr_abs_max, r.path_deviation_max_m)?;
+    }
+    Ok(())
 }
 
 /// A line for every run that predicts with an identified model.
@@ -141,7 +153,7 @@ pub(crate) fn recording(
     interrupt: &Interrupt,
 ) -> Result<Dataset> {
     let (dataset, summary) = record(scenario, vehicle, seed, interrupt)?;
-    record::write(&out.join("recording.csv"), &dataset)?;
+    record::write(&out.join(RECORDING), &dataset)?;
     write_json(&out.join("recording.json"), &summary)?;
     Ok(dataset)
 }

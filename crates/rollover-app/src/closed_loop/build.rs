@@ -2,10 +2,9 @@
 
 use std::sync::Arc;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use deepc_core::controller::{Controller, DeepcController, RecedingHorizonSettings};
-use deepc_core::data::Dataset;
-use deepc_core::hankel::{HankelMatrix, Horizons};
+use deepc_core::hankel::Horizons;
 use deepc_core::predictor::Predictor;
 use deepc_core::program::{
     Bounds, DeepcSettings, OutputBounds, ProgramOptions, Slack, StageSettings,
@@ -14,9 +13,9 @@ use deepc_core::solver::SolveBudget;
 use sysid::lmpc::{self, LmpcSettings};
 use sysid::{Identification, StateSpace};
 
-use super::recorded::{Recorded, Watch};
+use super::recorded::{PredictorOf, Recorded, Watch};
 use crate::scenario::{
-    ControllerSettings, DataMatrix, DataSettings, InputBounds, ModelSettings, Prediction, Scenario,
+    ControllerSettings, DataSettings, InputBounds, ModelSettings, Prediction, Scenario,
 };
 
 /// A controller, and what it was made from beside the recording.
@@ -40,11 +39,12 @@ pub fn controller(
 ) -> Result<Built> {
     Ok(match &settings.prediction {
         Prediction::Data(data) => Built {
-            controller: deepc(scenario, settings, data, recorded.data())?,
+            controller: deepc(scenario, settings, data, recorded)?,
             identification: None,
         },
         Prediction::Model(model) => {
-            let identification = recorded.identification(&model.identification, watch)?;
+            let identification =
+                recorded.identification(settings.records, &model.identification, watch)?;
             Built {
                 controller: linear_mpc(scenario, settings, model, &identification.model)?,
                 identification: Some(identification),
@@ -57,9 +57,9 @@ fn deepc(
     scenario: &Scenario,
     settings: &ControllerSettings,
     by_data: &DataSettings,
-    data: &Dataset,
+    recorded: &Recorded<'_>,
 ) -> Result<Box<dyn Controller>> {
-    let (predictor, program) = deepc_problem(scenario, settings, by_data, data)?;
+    let (predictor, program) = deepc_problem(scenario, settings, by_data, recorded)?;
     let controller = DeepcController::condensed(&predictor, &program, receding(settings))?;
     Ok(Box::new(controller))
 }
@@ -72,26 +72,17 @@ pub(crate) fn deepc_problem(
     scenario: &Scenario,
     settings: &ControllerSettings,
     by_data: &DataSettings,
-    data: &Dataset,
-) -> Result<(Predictor, DeepcSettings)> {
-    let horizons = Horizons {
-        past: settings.past_steps,
-        future: settings.horizon_steps,
-    };
-    let hankel = HankelMatrix::build(data, horizons).context("the recording cannot be used")?;
-    let exciting = hankel
-        .require_persistently_exciting(by_data.order_bound)
-        .context("the recording cannot be used")?;
-    if let Some((name, value)) = exciting.report().and_then(|r| r.constant_outputs.first()) {
-        bail!(
-            "the recording cannot be used: output `{name}` is constant at {value}, so nothing can \
-             be learnt about it; check its sensor and record again"
-        );
-    }
-    let predictor = match by_data.matrix {
-        DataMatrix::Whole => Predictor::full(&exciting),
-        DataMatrix::Reduced => Predictor::exact(&exciting)?,
-    };
+    recorded: &Recorded<'_>,
+) -> Result<(Arc<Predictor>, DeepcSettings)> {
+    let predictor = recorded.predictor(PredictorOf {
+        records: settings.records,
+        horizons: Horizons {
+            past: settings.past_steps,
+            future: settings.horizon_steps,
+        },
+        order_bound: by_data.order_bound,
+        matrix: by_data.matrix,
+    })?;
     let stage = stage(&scenario.bounds, settings);
     let program = DeepcSettings {
         input_bounds: stage.input_bounds,

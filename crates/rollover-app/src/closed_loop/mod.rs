@@ -2,6 +2,7 @@
 
 mod build;
 mod plant;
+mod preview;
 mod recorded;
 
 use std::path::Path;
@@ -16,6 +17,7 @@ use vehicle_dyn::terrain::Terrain;
 pub(crate) use build::deepc_problem;
 pub use build::{Built, controller};
 pub use plant::{DrivenVehicle, INPUTS, OUTPUTS};
+pub use preview::SteeringProfile;
 pub use recorded::{Recorded, Watch};
 
 use crate::interrupt::{Interrupt, Interrupted};
@@ -36,8 +38,31 @@ pub struct Run<'a> {
     pub seed: u64,
     /// Target speed where no controller decides, km/h.
     pub fixed_target_speed_kmh: f64,
+    /// What the controller is told of the driver's steering ahead; without, his present wish is held.
+    pub preview: Option<SteeringProfile>,
     /// The controller; `None` leaves the driver alone.
     pub controller: Option<Box<dyn Controller>>,
+}
+
+impl<'a> Run<'a> {
+    /// The driver alone at the scenario's speed, with seed 0.
+    #[must_use]
+    pub fn of_driver(
+        scenario: &'a Scenario,
+        vehicle: &'a VehicleParameters,
+        terrain: Terrain,
+    ) -> Self {
+        Self {
+            scenario,
+            vehicle,
+            terrain,
+            speed_reference_kmh: scenario.speed_reference_kmh,
+            seed: 0,
+            fixed_target_speed_kmh: scenario.speed_reference_kmh,
+            preview: None,
+            controller: None,
+        }
+    }
 }
 
 /// A finished run.
@@ -77,7 +102,18 @@ pub fn run(
         }
         let wanted = [plant.driver_steering_deg(), run.speed_reference_kmh];
         let decision = match (run.controller.as_deref_mut(), reference.as_mut()) {
-            (Some(controller), Some(reference)) => decide(controller, reference, &wanted)?,
+            (Some(controller), Some(reference)) => {
+                match &run.preview {
+                    None => reference.hold(&wanted, &[0.0; OUTPUTS])?,
+                    Some(profile) => profile.fill(
+                        reference,
+                        &wanted,
+                        (plant.location().station_m, plant.observation().speed_m_s),
+                        run.scenario.sample_time_s,
+                    )?,
+                }
+                decide(controller, reference)
+            }
             _ => Decision::passthrough([wanted[0], run.fixed_target_speed_kmh]),
         };
         let mut output = [0.0];
@@ -158,15 +194,9 @@ impl Decision {
     }
 }
 
-/// Asks the controller. The driver's present wish is held over the horizon: that is all that is
-/// known of it.
-fn decide(
-    controller: &mut dyn Controller,
-    reference: &mut Reference,
-    wanted: &[f64; INPUTS],
-) -> Result<Decision> {
+/// Asks the controller.
+fn decide(controller: &mut dyn Controller, reference: &Reference) -> Decision {
     let started = Instant::now();
-    reference.hold(wanted, &[0.0; OUTPUTS])?;
     let step = controller.decide(reference);
     let time_us = started.elapsed().as_secs_f64() * 1e6;
     let status = match step.origin {
@@ -179,13 +209,13 @@ fn decide(
         Origin::Hold => SolveStatus::FallbackHold,
         Origin::User => SolveStatus::FallbackUser,
     };
-    Ok(Decision {
+    Decision {
         input: [step.input[0], step.input[1]],
         status,
         predicted_violation: step.predicted_violation,
         iterations: step.iterations,
         time_us,
-    })
+    }
 }
 
 fn log_row(

@@ -49,6 +49,7 @@ pub fn identify(args: &IdentifyArgs, interrupt: &Interrupt) -> Result<()> {
         order: args.order,
         max_order: args.max_order,
         without_effect: args.without_effect.clone(),
+        offsets: args.offsets.into(),
         ..IdentificationSettings::default()
     };
     let identification = with_progress(&data, &settings, interrupt)?;

@@ -130,7 +130,7 @@ pub(super) fn render(results: &Results, figures: &[Figure]) -> Result<String> {
 fn origin(results: &Results) -> String {
     let report = &results.identification.report;
     format!(
-        "Made from {} samples in {} of {}, {} s apart. Subspace estimate {} with horizon {}{}.",
+        "Made from {} samples in {} of {}, {} s apart. Subspace estimate {} with horizon {}{}{}.",
         report.samples,
         match report.records {
             1 => "one record".to_owned(),
@@ -145,6 +145,11 @@ fn origin(results: &Results) -> String {
             (true, sysid::FocusChoice::Prediction) =>
                 ", refined by prediction error one step ahead",
             (true, _) => ", refined on the simulated output",
+        },
+        match report.offsets {
+            sysid::OffsetChoice::Found => "",
+            sysid::OffsetChoice::Means => ", of data without their means",
+            sysid::OffsetChoice::None => ", of raw data: the model goes through the origin",
         }
     )
 }

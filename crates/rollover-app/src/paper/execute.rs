@@ -10,6 +10,7 @@ use indicatif::ProgressBar;
 
 use super::fingerprint::Program;
 use super::plan::{Plan, PlannedRun};
+use crate::campaign::RECORDING;
 use crate::campaign::job::{FINGERPRINT_FILE, Job, remove_old_results, step_bar};
 use crate::closed_loop::Recorded;
 use crate::interrupt::{Interrupt, Interrupted};
@@ -155,7 +156,7 @@ impl<'a> Execution<'a> {
                 if self.plan.seeds.first() == Some(&group.seed) {
                     let folder = self.out.join(&scenario.name);
                     create_folder(&folder)?;
-                    record::write(&folder.join("recording.csv"), &data)?;
+                    record::write(&folder.join(RECORDING), &data)?;
                     write_json(&folder.join("recording.json"), &summary)?;
                 }
                 Ok(Ok(data))
@@ -180,7 +181,7 @@ impl<'a> Execution<'a> {
             mirrored: run.mirrored,
             speed_reference_kmh: scenario.speed_reference_kmh,
             recorded: recorded.as_ref().ok().copied().filter(|_| by_data),
-            recording: None,
+            recording: &[],
             logged: run.logged,
             out: out.clone(),
         };

@@ -69,5 +69,8 @@ fn command(args: &PaperArgs) -> String {
     if !args.only.is_empty() {
         words.push(format!("--only {}", args.only.join(",")));
     }
+    if !args.controllers.is_empty() {
+        words.push(format!("--controllers {}", args.controllers.join(",")));
+    }
     words.join(" ")
 }

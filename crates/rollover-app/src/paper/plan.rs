@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use vehicle_dyn::parameters::VehicleParameters;
 use vehicle_dyn::terrain::Terrain;
 
@@ -12,6 +12,7 @@ use crate::interrupt::Interrupt;
 use crate::report::claims;
 use crate::scenario::{self, DRIVER, DataMatrix, FLOOR, Prediction, Scenario};
 use crate::terrain;
+use crate::toml_place::suggested;
 
 /// Recording seeds that no setting was chosen on.
 const JUDGED_SEEDS: std::ops::Range<u64> = 10..20;
@@ -25,6 +26,8 @@ pub(super) struct Plan {
     pub(super) scenes: Vec<Scene>,
     /// Recording seeds; the logs of the first are kept.
     pub(super) seeds: Vec<u64>,
+    /// Names of the controllers; all if there are none.
+    controllers: Vec<String>,
     /// Moments at which the programs as written are timed.
     pub(super) moments: usize,
 }
@@ -65,9 +68,12 @@ impl Plan {
             None if args.quick => judged()[..QUICK_SEEDS].to_vec(),
             None => judged(),
         };
+        let scenes: Vec<Scene> = scenes.collect::<Result<_>>()?;
+        check_controllers(&args.controllers, &scenes)?;
         Ok(Self {
-            scenes: scenes.collect::<Result<_>>()?,
+            scenes,
             seeds,
+            controllers: args.controllers.clone(),
             moments: if args.quick {
                 QUICK_MOMENTS
             } else {
@@ -90,7 +96,9 @@ impl Plan {
         let scenario = &self.scenes[scene].as_it_is.scenario;
         let shown = self.seeds.first() == Some(&seed);
         let mut runs = Vec::new();
-        for controller in scenario.controller_names() {
+        let wanted =
+            |name: &&str| self.controllers.is_empty() || self.controllers.iter().any(|c| c == name);
+        for controller in scenario.controller_names().into_iter().filter(wanted) {
             for mirrored in [false, true] {
                 let once = runs_once(scenario, controller);
                 // The whole matrix decides as the reduced one does: one run shows it.
@@ -125,6 +133,23 @@ impl Plan {
             &scene.as_it_is
         }
     }
+}
+
+/// Every name must be that of a controller of some scenario.
+fn check_controllers(names: &[String], scenes: &[Scene]) -> Result<()> {
+    let scenarios = scenes.iter().map(|scene| &scene.as_it_is.scenario);
+    let mut known: Vec<&str> = scenarios.flat_map(Scenario::controller_names).collect();
+    known.sort_unstable();
+    known.dedup();
+    for name in names {
+        ensure!(
+            known.contains(&name.as_str()),
+            "--controllers {name}: no scenario of the campaign has it{}: choose from {}",
+            suggested(name, known.iter().copied()),
+            known.join(", ")
+        );
+    }
+    Ok(())
 }
 
 /// Whether every seed would give the same run, or one shows enough.

@@ -301,7 +301,8 @@ fn by_name(summary: &KnownSummary) -> Option<SceneFile> {
     let scenario = scenario::load(summary.scenario.as_deref()?).ok()?;
     let vehicle = vehicle_dyn::vehicles::find(summary.vehicle.as_deref()?).ok()?;
     let controller = summary.controller.as_deref()?;
-    SceneFile::new(&scenario, &vehicle, controller, summary.seed?).ok()
+    // Its ground may have come from a file: what is not known is not drawn.
+    SceneFile::new(&scenario, &vehicle, controller, summary.seed?, None).ok()
 }
 
 /// Makes the labels of a scene's runs differ: by course, by seed, else by their files.

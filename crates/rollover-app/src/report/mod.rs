@@ -25,6 +25,7 @@ mod panels;
 mod paper_figures;
 mod plots;
 mod scene_file;
+mod scene_ground;
 mod snapshot;
 mod table;
 mod tables;

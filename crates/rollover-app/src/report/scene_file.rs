@@ -4,8 +4,9 @@ use anyhow::Result;
 use serde::{Deserialize, Serialize};
 use vehicle_dyn::parameters::VehicleParameters;
 use vehicle_dyn::road::{Course, CourseDescription};
+use vehicle_dyn::terrain::Terrain;
 
-use super::data::{Limits, Road, Role, Run, Scene, VehicleShape};
+use super::data::{HeightProfile, Limits, Road, Role, Run, Scene, TerrainMap, VehicleShape};
 use crate::scenario::{ControllerSettings, DRIVER, Prediction, Scenario};
 use crate::summary::{InputWeights, LTR_LIFT_OFF};
 
@@ -29,7 +30,7 @@ pub struct SceneFile {
 }
 
 impl SceneFile {
-    /// Describes a run of a scenario.
+    /// Describes a run of a scenario, with its ground where that is at hand.
     ///
     /// # Errors
     /// When the scenario's course cannot be built.
@@ -38,14 +39,19 @@ impl SceneFile {
         vehicle: &VehicleParameters,
         controller: &str,
         seed: u64,
+        terrain: Option<&Terrain>,
     ) -> Result<Self> {
+        let course = Course::new(&scenario.course)?;
+        let shape = VehicleShape::of(vehicle);
         let settings = scenario.controllers.get(controller);
         let scene = Scene {
             name: scenario.name.clone(),
             title: format!("{}, vehicle {}", scenario.name, vehicle.name),
             description: scenario.description.clone(),
             road: Some(Road::new(&scenario.course)?),
-            vehicle: Some(VehicleShape::of(vehicle)),
+            terrain: terrain.and_then(|t| TerrainMap::around(t, &course)),
+            profile: terrain.and_then(|t| HeightProfile::along(t, &course, shape.track_m)),
+            vehicle: Some(shape),
             limits: Limits {
                 ltr: Some(LTR_LIFT_OFF),
                 target_speed_kmh: Some(scenario.bounds.target_speed_kmh),

@@ -12,6 +12,7 @@ use thiserror::Error;
 
 use super::controllers::{
     ControllerSettings, DataMatrix, DataSettings, LtrPenalty, ModelSettings, Prediction,
+    ReferenceAhead,
 };
 use crate::summary::InputWeights;
 
@@ -29,6 +30,8 @@ struct ControllerEntry {
     ltr_limit: Option<f64>,
     ltr_penalty: Option<LtrPenalty>,
     input_weights: Option<InputWeights>,
+    reference: Option<ReferenceAhead>,
+    records: Option<usize>,
     order_bound: Option<usize>,
     regularisation: Option<Regularisation>,
     lambda_u: Option<f64>,
@@ -159,6 +162,8 @@ impl TryFrom<ControllerEntry> for ControllerSettings {
             ltr_limit: given("ltr_limit", entry.ltr_limit)?,
             ltr_penalty: given("ltr_penalty", entry.ltr_penalty)?,
             input_weights: given("input_weights", entry.input_weights)?,
+            reference: entry.reference.unwrap_or_default(),
+            records: entry.records,
             prediction,
         })
     }
@@ -182,6 +187,8 @@ impl ControllerEntry {
             ltr_limit: self.ltr_limit.or(base.ltr_limit),
             ltr_penalty: self.ltr_penalty.or(base.ltr_penalty),
             input_weights: self.input_weights.or(base.input_weights),
+            reference: self.reference.or(base.reference),
+            records: self.records.or(base.records),
             order_bound: self.order_bound.or(base.order_bound),
             regularisation: self.regularisation.or(base.regularisation),
             lambda_u: self.lambda_u.or(base.lambda_u),

@@ -25,8 +25,23 @@ pub struct ControllerSettings {
     pub ltr_penalty: LtrPenalty,
     /// Weights R on the inputs' distance from their references.
     pub input_weights: InputWeights,
+    /// What it is told of the driver's steering over the horizon.
+    pub reference: ReferenceAhead,
+    /// How many records of the recording it works from, the first ones; all of them if `None`.
+    pub records: Option<usize>,
     /// How it predicts.
     pub prediction: Prediction,
+}
+
+/// What a controller is told of the driver's steering over the horizon. The paper does not say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ReferenceAhead {
+    /// His present wish, held: nothing else is known.
+    #[default]
+    Held,
+    /// His present wish, changed as his steering changed ahead of here on an earlier, slower drive.
+    Preview,
 }
 
 /// How a controller predicts, by the scenario file's `method`.

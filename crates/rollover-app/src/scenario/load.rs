@@ -10,6 +10,7 @@ use vehicle_dyn::sensors::{Channel, Sensor, SensorError};
 use vehicle_dyn::terrain::GroundError;
 
 use super::place::malformed;
+use super::recording_check::{GroundOf, ground_of};
 use super::{
     CONTROLLER_CHANNEL, ControllerSettings, DRIVER_CHANNELS, ModelSettings, Prediction, Scenario,
 };
@@ -17,10 +18,20 @@ use crate::record::INPUT_COLUMNS;
 use crate::toml_place::{Place, suggested};
 
 /// Scenarios that travel with the binary.
-const EMBEDDED: [(&str, &str); 1] = [(
-    "sedan-s1",
-    include_str!("../../../../scenarios/sedan-s1.toml"),
-)];
+const EMBEDDED: [(&str, &str); 3] = [
+    (
+        "sedan-s1",
+        include_str!("../../../../scenarios/sedan-s1.toml"),
+    ),
+    (
+        "truck-s2",
+        include_str!("../../../../scenarios/truck-s2.toml"),
+    ),
+    (
+        "riverbed-s3",
+        include_str!("../../../../scenarios/riverbed-s3.toml"),
+    ),
+];
 
 /// What can be wrong with a scenario.
 #[derive(Debug, Error)]
@@ -66,12 +77,12 @@ pub enum ScenarioError {
         allowed: String,
     },
     /// A ground is not allowed or does not fit its course.
-    #[error("{origin}: {of}{source}")]
+    #[error("{origin}: {}{source}", of.words)]
     Ground {
         /// The file or the embedded name.
         origin: String,
-        /// Where the ground stands; empty for that of the scenario itself.
-        of: &'static str,
+        /// Whose ground it is.
+        of: GroundOf,
         /// What is wrong and what to do.
         source: GroundError,
     },
@@ -81,7 +92,7 @@ pub enum ScenarioError {
         /// The file or the embedded name.
         origin: String,
         /// The course's field.
-        field: &'static str,
+        field: String,
         /// What is wrong and what to do.
         message: String,
     },
@@ -193,7 +204,7 @@ fn parse(text: &str, origin: &str) -> Result<Scenario, ScenarioError> {
 }
 
 /// Range checks; every message names the origin, the field, the number and what is allowed.
-struct Check<'a> {
+pub(super) struct Check<'a> {
     origin: &'a str,
 }
 
@@ -203,9 +214,13 @@ impl Check<'_> {
         self.within("sample_time_s", s.sample_time_s, 0.001, 0.1)?;
         self.within("duration_s", s.duration_s, s.sample_time_s, 3600.0)?;
         self.within("speed_reference_kmh", s.speed_reference_kmh, 10.0, 250.0)?;
-        self.ground("", s.ground.check())?;
-        if let Some(ground) = &s.recording.ground {
-            self.ground("recording.", ground.check())?;
+        self.ground(GroundOf::table(""), s.ground.check())?;
+        let further = s.recording.more.iter().map(|record| &record.ground);
+        let own = std::iter::once(&s.recording.ground).chain(further);
+        for (index, ground) in own.enumerate() {
+            if let Some(ground) = ground {
+                self.ground(ground_of(s, index), ground.check())?;
+            }
         }
         let bounds = &s.bounds;
         self.range("bounds.steering_wheel_deg", bounds.steering_wheel_deg, 0.0)?;
@@ -226,55 +241,25 @@ impl Check<'_> {
             0.0,
             540.0,
         )?;
-        let recording = &s.recording;
-        self.within(
-            "recording.duration_s",
-            recording.duration_s,
-            s.sample_time_s,
-            3600.0,
-        )?;
-        self.within(
-            "recording.target_speed_kmh",
-            recording.target_speed_kmh,
-            10.0,
-            250.0,
-        )?;
-        self.within(
-            "recording.steering_wheel_noise_deg",
-            recording.steering_wheel_noise_deg,
-            0.0,
-            90.0,
-        )?;
-        self.within(
-            "recording.target_speed_noise_kmh",
-            recording.target_speed_noise_kmh,
-            0.0,
-            50.0,
-        )?;
         self.course(
             "course",
             Course::new(&s.course),
             s.duration_s,
             s.speed_reference_kmh,
         )?;
-        self.course(
-            "recording.course",
-            Course::new(&recording.course),
-            recording.duration_s,
-            recording.target_speed_kmh,
-        )?;
+        self.recording(s)?;
         self.sensors(s)?;
         self.grounds_on_courses(s)?;
         if let Some(driver) = &s.driver {
             driver.check().map_err(|e| ScenarioError::Course {
                 origin: self.origin.to_owned(),
-                field: "driver",
+                field: "driver".to_owned(),
                 message: e.to_string(),
             })?;
         }
         s.controllers
             .iter()
-            .try_for_each(|(name, c)| self.controller(name, c))
+            .try_for_each(|(name, c)| self.controller(s, name, c))
     }
 
     fn sensors(&self, s: &Scenario) -> Result<(), ScenarioError> {
@@ -308,7 +293,12 @@ impl Check<'_> {
         Ok(())
     }
 
-    fn controller(&self, name: &str, c: &ControllerSettings) -> Result<(), ScenarioError> {
+    fn controller(
+        &self,
+        s: &Scenario,
+        name: &str,
+        c: &ControllerSettings,
+    ) -> Result<(), ScenarioError> {
         let field = |key: &str| format!("controllers.{name}.{key}");
         if [super::DRIVER, super::FLOOR].contains(&name) {
             return Err(self.out_of_range(
@@ -327,6 +317,16 @@ impl Check<'_> {
         counts
             .iter()
             .try_for_each(|&(key, count)| self.count(&field(key), count))?;
+        let recorded = s.recording.more.len() + 1;
+        if c.records
+            .is_some_and(|used| !(1..=recorded).contains(&used))
+        {
+            return Err(self.out_of_range(
+                &field("records"),
+                c.records.unwrap_or_default().to_string(),
+                &format!("in [1, {recorded}], the number of records of the recording"),
+            ));
+        }
         if c.moves_per_solve > c.horizon_steps {
             return Err(self.out_of_range(
                 &field("moves_per_solve"),
@@ -388,11 +388,7 @@ impl Check<'_> {
         })
     }
 
-    fn ground(
-        &self,
-        of: &'static str,
-        checked: Result<(), GroundError>,
-    ) -> Result<(), ScenarioError> {
+    fn ground(&self, of: GroundOf, checked: Result<(), GroundError>) -> Result<(), ScenarioError> {
         checked.map_err(|source| ScenarioError::Ground {
             origin: self.origin.to_owned(),
             of,
@@ -402,16 +398,10 @@ impl Check<'_> {
 
     /// Whether all that the grounds hold lies on their courses, which are known to be good.
     fn grounds_on_courses(&self, s: &Scenario) -> Result<(), ScenarioError> {
-        let of_recording = if s.recording.ground.is_some() {
-            "recording."
-        } else {
-            "recording.course has no [recording.ground] of its own: "
-        };
-        let both = [
-            ("", &s.ground, &s.course),
-            (of_recording, s.recording_ground(), &s.recording.course),
-        ];
-        for (of, ground, course) in both {
+        let own = std::iter::once((GroundOf::table(""), &s.ground, &s.course));
+        let records = s.records().into_iter().enumerate();
+        let records = records.map(|(i, r)| (ground_of(s, i), r.ground, r.course));
+        for (of, ground, course) in own.chain(records) {
             if let Ok(course) = Course::new(course) {
                 self.ground(of, ground.check_on(&course))?;
             }
@@ -426,16 +416,16 @@ impl Check<'_> {
         Err(self.out_of_range(field, count.to_string(), "in [1, 10000]"))
     }
 
-    fn course<E: std::fmt::Display>(
+    pub(super) fn course<E: std::fmt::Display>(
         &self,
-        field: &'static str,
+        field: &str,
         course: Result<Course, E>,
         duration_s: f64,
         speed_kmh: f64,
     ) -> Result<(), ScenarioError> {
         let wrong = |message: String| ScenarioError::Course {
             origin: self.origin.to_owned(),
-            field,
+            field: field.to_owned(),
             message,
         };
         let length = course.map_err(|e| wrong(e.to_string()))?.total_length_m();
@@ -448,7 +438,13 @@ impl Check<'_> {
         Ok(())
     }
 
-    fn within(&self, field: &str, value: f64, low: f64, high: f64) -> Result<(), ScenarioError> {
+    pub(super) fn within(
+        &self,
+        field: &str,
+        value: f64,
+        low: f64,
+        high: f64,
+    ) -> Result<(), ScenarioError> {
         if (low..=high).contains(&value) {
             return Ok(());
         }

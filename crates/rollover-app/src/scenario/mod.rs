@@ -4,6 +4,8 @@ mod controller_file;
 mod controllers;
 mod load;
 mod place;
+mod recording;
+mod recording_check;
 
 use std::collections::BTreeMap;
 
@@ -16,8 +18,11 @@ use vehicle_dyn::terrain::GroundDescription;
 
 pub use controllers::{
     ControllerSettings, DataMatrix, DataSettings, LtrPenalty, ModelSettings, Prediction,
+    ReferenceAhead,
 };
 pub use load::{ScenarioError, embedded_names, embedded_text, load};
+pub use recording::{FurtherRecord, RecordRecipe, RecordingRecipe};
+pub use recording_check::GroundOf;
 
 use crate::toml_place::suggested;
 
@@ -86,24 +91,6 @@ pub struct InputBounds {
     pub target_speed_kmh: [f64; 2],
 }
 
-/// The paper's data recipe: the driver follows a winding road, white noise on both inputs.
-#[derive(Debug, Clone, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct RecordingRecipe {
-    /// Length of the recording, s.
-    pub duration_s: f64,
-    /// Target speed before noise, km/h.
-    pub target_speed_kmh: f64,
-    /// Standard deviation of the noise on the steering wheel, deg per sample.
-    pub steering_wheel_noise_deg: f64,
-    /// Standard deviation of the noise on the target speed, km/h per sample.
-    pub target_speed_noise_kmh: f64,
-    /// The road of the recording.
-    pub course: CourseDescription,
-    /// The ground of the recording; that of the scenario where it is absent.
-    pub ground: Option<GroundDescription>,
-}
-
 impl Scenario {
     /// Names of all controllers, the driver first.
     #[must_use]
@@ -155,12 +142,6 @@ impl Scenario {
         mirrored
     }
 
-    /// The ground under the recording's course.
-    #[must_use]
-    pub fn recording_ground(&self) -> &GroundDescription {
-        self.recording.ground.as_ref().unwrap_or(&self.ground)
-    }
-
     /// Who drives `vehicle`: the scenario's driver, or else the vehicle's own.
     ///
     /// # Errors
@@ -186,12 +167,6 @@ impl Scenario {
     #[must_use]
     pub fn steps(&self) -> usize {
         steps(self.duration_s, self.sample_time_s)
-    }
-
-    /// Number of samples of a recording.
-    #[must_use]
-    pub fn recording_samples(&self) -> usize {
-        steps(self.recording.duration_s, self.sample_time_s)
     }
 }
 

@@ -24,11 +24,9 @@ impl ScenarioError {
     /// The field of the file that it is about.
     pub(super) fn field(&self) -> Option<String> {
         match self {
-            Self::OutOfRange { field, .. } => Some(field.clone()),
-            Self::Course { field, .. } => Some((*field).to_owned()),
+            Self::OutOfRange { field, .. } | Self::Course { field, .. } => Some(field.clone()),
             Self::Ground { of, source, .. } => {
-                // A ground that fits its own course may not fit that of the recording.
-                let table = if *of == "recording." { *of } else { "" };
+                let table = &of.table;
                 // Its message begins with the field.
                 let message = source.to_string();
                 let field = message.split([' ', ':']).next().unwrap_or_default();

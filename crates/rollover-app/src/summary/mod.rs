@@ -24,7 +24,7 @@ pub struct Summary {
     /// Whether the course was driven as its mirror image.
     #[serde(default)]
     pub mirrored: bool,
-    /// File of the recording, where it was given and not made from the seed.
+    /// Files of the recording, where they were given and not made from the seed.
     pub recording: Option<String>,
     /// Speed at the start and reference afterwards, km/h.
     pub speed_reference_kmh: f64,
@@ -108,7 +108,7 @@ pub struct RunIdentity {
     pub mirrored: bool,
     /// Stations at which each turn of the course begins and ends, m.
     pub turns_m: Vec<[f64; 2]>,
-    /// File of the recording, where it was given and not made from the seed.
+    /// Files of the recording, where they were given and not made from the seed.
     pub recording: Option<String>,
     /// Speed at the start and reference afterwards, km/h.
     pub speed_reference_kmh: f64,

@@ -3,8 +3,6 @@
 use std::fmt;
 
 use anyhow::Result;
-use deepc_core::predictor::Predictor;
-use deepc_core::program::DeepcSettings;
 use sysid::Progress;
 
 use super::agreement::{compare, cost, gap, on_data, same_problem};
@@ -106,12 +104,7 @@ fn on_matrix<'a>(
     };
     work.next(follow, &format!("{method}: set-up"));
     let by_data = on_data(&run, matrix)?;
-    let problem: (Predictor, DeepcSettings) = deepc_problem(
-        timing.scenario,
-        run.settings,
-        by_data,
-        timing.recorded.data(),
-    )?;
+    let problem = deepc_problem(timing.scenario, run.settings, by_data, timing.recorded)?;
     let whose = |form| Whose {
         controller: run.name,
         form,

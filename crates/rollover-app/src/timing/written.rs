@@ -1,5 +1,6 @@
 //! One data-driven problem at the moments, as the paper writes it and condensed.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::Result;
@@ -48,7 +49,7 @@ pub(super) struct Whose<'a> {
 /// Solves the program as written at every moment, telling `step` before each.
 pub(super) fn as_written(
     whose: Whose<'_>,
-    (predictor, settings): &(Predictor, DeepcSettings),
+    (predictor, settings): &(Arc<Predictor>, DeepcSettings),
     moments: &[Past],
     follow: &mut Follow<'_>,
     step: &mut dyn FnMut(&mut Follow<'_>),
@@ -72,7 +73,7 @@ pub(super) fn as_written(
 /// Solves the condensed program at every moment.
 pub(super) fn condensed(
     whose: Whose<'_>,
-    (predictor, settings): &(Predictor, DeepcSettings),
+    (predictor, settings): &(Arc<Predictor>, DeepcSettings),
     moments: &[Past],
     follow: &mut Follow<'_>,
 ) -> Result<AtMoments> {

@@ -6,7 +6,7 @@ use std::path::Path;
 use deepc_core::data::{CsvLayout, Dataset, OutputTiming};
 use sysid::{InitialStateFor, StateSpace};
 
-use super::{assert_says, folder, read, succeed, write};
+use super::{assert_says, fail, folder, read, succeed, write};
 
 /// The gains of the plant below, one row per output.
 const GAINS: [[f64; 2]; 2] = [[2.0, -1.0], [0.5, 3.0]];
@@ -240,6 +240,37 @@ fn an_input_that_does_nothing_stands_out_and_can_be_held_at_zero() {
         !folder.path().join("frequency-1-2.svg").exists(),
         "there is no response to draw, and the one of the last run is gone"
     );
+}
+
+#[test]
+fn offsets_can_be_the_means_or_none() {
+    let folder = folder();
+    write(&folder.path().join("tanks.csv"), &tanks(300, 8));
+    let offsets = |choice: &str| {
+        let printed = succeed(
+            folder.path(),
+            &with(&["--order", "2", "--offsets", choice, "--out", "."]),
+        );
+        let model = StateSpace::load(folder.path().join("model.json")).expect("a model");
+        let outputs: Vec<f64> = model.outputs().iter().map(|c| c.offset).collect();
+        (printed, outputs)
+    };
+    for choice in ["found", "means"] {
+        let (_, outputs) = offsets(choice);
+        for (offset, true_offset) in outputs.iter().zip(OFFSETS) {
+            assert!((offset - true_offset).abs() < 0.5, "{choice}: {offset}");
+        }
+    }
+    let (printed, outputs) = offsets("none");
+    assert_eq!(outputs, [0.0, 0.0]);
+    assert_says(
+        &printed,
+        &["warning: the model goes through the origin", "`left`"],
+    );
+    let page = read(&folder.path().join("index.html"));
+    assert_says(&page, &["raw data"]);
+    let message = fail(folder.path(), &with(&["--offsets", "raw"]));
+    assert_says(&message, &["--offsets", "'raw'", "found, means, none"]);
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Ctrl-C during a run.
 #![cfg(unix)]
 
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -12,11 +13,20 @@ use super::{assert_says, command, folder, write};
 const PATIENCE: Duration = Duration::from_mins(2);
 
 /// Sends Ctrl-C.
-fn interrupt(process: u32) {
+pub(super) fn interrupt(process: u32) {
     let sent = Command::new("kill")
         .args(["-INT", &process.to_string()])
         .status();
     assert!(sent.expect("kill starts").success(), "the signal is sent");
+}
+
+/// Waits until a file holds something.
+pub(super) fn wait_for_file(file: &Path) {
+    let started = Instant::now();
+    while std::fs::metadata(file).map_or(0, |m| m.len()) == 0 {
+        assert!(started.elapsed() < PATIENCE, "no {}", file.display());
+        std::thread::sleep(Duration::from_millis(2));
+    }
 }
 
 #[test]
@@ -41,12 +51,8 @@ fn what_was_logged_before_ctrl_c_stays_readable() {
         .spawn()
         .expect("the command starts");
     let log = folder.path().join("stopped/log.csv");
-    let started = Instant::now();
     // The first flush shows that the run is under way.
-    while std::fs::metadata(&log).map_or(0, |m| m.len()) == 0 {
-        assert!(started.elapsed() < PATIENCE, "the run does not begin");
-        std::thread::sleep(Duration::from_millis(2));
-    }
+    wait_for_file(&log);
     interrupt(running.id());
     let output = running.wait_with_output().expect("the command ends");
 
@@ -70,40 +76,6 @@ fn what_was_logged_before_ctrl_c_stays_readable() {
         !folder.path().join("stopped/summary.json").exists(),
         "no summary of half a run"
     );
-}
-
-#[test]
-fn a_campaign_that_is_stopped_leaves_no_page_and_no_empty_log() {
-    let folder = folder();
-    let out = folder.path().join("out");
-    super::succeed(
-        folder.path(),
-        &["paper", "--jobs", "1", "--out", "out", "--json"],
-    );
-    let before = std::fs::read(out.join("rd-deepc-1-paper/log.csv")).expect("the last run's log");
-    std::fs::remove_file(out.join("driver/log.csv")).expect("the first run's log is there");
-    let running = command(
-        folder.path(),
-        &["paper", "--jobs", "1", "--out", "out", "--seed", "11"],
-    )
-    .stdout(Stdio::piped())
-    .stderr(Stdio::piped())
-    .spawn()
-    .expect("the command starts");
-    let started = Instant::now();
-    while std::fs::metadata(out.join("driver/log.csv")).map_or(0, |m| m.len()) == 0 {
-        assert!(started.elapsed() < PATIENCE, "the campaign does not begin");
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    interrupt(running.id());
-    let output = running.wait_with_output().expect("the command ends");
-    assert_eq!(output.status.code(), Some(130));
-    assert!(
-        !out.join("report.html").exists(),
-        "no page about another seed's runs"
-    );
-    let after = std::fs::read(out.join("rd-deepc-1-paper/log.csv")).expect("the last run's log");
-    assert_eq!(before, after, "a run that did not begin keeps what it had");
 }
 
 /// Waits until a process handles Ctrl-C itself; before that the signal would just kill it.

@@ -98,6 +98,11 @@ fn settings_of_an_identification_are_checked_on_loading() {
             "`target_speed_kmh`",
         ],
     );
+    let message = fail_with_controller(controller, "order = 4", "offsets = \"raw\"");
+    assert_says(
+        &message,
+        &["mine.toml", "line", "`raw`", "`found`, `means`, `none`"],
+    );
     let message = fail_with_controller(controller, "order = 4", "ordre = 4");
     assert_says(&message, &["mine.toml", "line", "ordre"]);
 }

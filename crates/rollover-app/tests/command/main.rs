@@ -7,6 +7,8 @@ mod identify_bad_input;
 mod interruption;
 mod linear_mpc;
 mod manoeuvre;
+mod paper;
+mod records;
 mod reproducible;
 mod terrain;
 mod vehicles;

@@ -2,7 +2,14 @@
 
 use super::{assert_says, fail, folder, read, succeed, write};
 
-const NAMES: [&str; 5] = ["sedan", "sedan-unladen", "utility-truck", "suv", "hmmwv"];
+const NAMES: [&str; 6] = [
+    "sedan",
+    "sedan-unladen",
+    "utility-truck",
+    "utility-truck-laden",
+    "suv",
+    "hmmwv",
+];
 
 fn json(text: &str) -> serde_json::Value {
     serde_json::from_str(text).expect("the output is JSON")

@@ -4,7 +4,7 @@ use deepc_core::faer::Mat;
 use deepc_core::hankel::{FactorMethod, OnesRow};
 
 use super::evaluate::{mean_log, simulation_errors};
-use super::settings::IdentificationSettings;
+use super::settings::{IdentificationSettings, OffsetChoice};
 use crate::error::SysidError;
 use crate::input_fit::{InputStructure, fit_inputs};
 use crate::prediction_error::{Focus, OutputWeights, RefineSettings, refine, refine_gain};
@@ -31,18 +31,22 @@ pub(super) struct Basis {
 pub(super) fn bases(
     data: &WorkingData,
     horizons: &[usize],
-    weightings: &[Weighting],
+    settings: &IdentificationSettings,
 ) -> Result<Vec<Basis>, SysidError> {
     let (mut bases, mut failure) = (Vec::new(), None);
+    let ones = match settings.offsets {
+        OffsetChoice::Found => OnesRow::OnTop,
+        OffsetChoice::Means | OffsetChoice::None => OnesRow::Without,
+    };
     for &horizon in horizons {
-        let factor = match Factor::new(data, horizon, horizon, OnesRow::OnTop, FactorMethod::Gram) {
+        let factor = match Factor::new(data, horizon, horizon, ones, FactorMethod::Gram) {
             Ok(factor) => factor,
             Err(error) => {
                 failure.get_or_insert(error);
                 continue;
             }
         };
-        for &weighting in weightings {
+        for &weighting in &settings.weightings {
             match factor.project(weighting) {
                 Ok(projection) => bases.push(Basis {
                     weighting,

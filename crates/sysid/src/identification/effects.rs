@@ -3,11 +3,12 @@
 use deepc_core::faer::Mat;
 
 use super::candidate::Search;
+use super::offsets::variances;
 use super::report::{
     EffectVerdict, IdentificationReport, InputEffect, UNIDENTIFIED_RATIO,
     UNIDENTIFIED_RESPONSE_RATIO,
 };
-use super::settings::IdentificationSettings;
+use super::settings::{IdentificationSettings, OffsetChoice};
 use crate::state_space::{StateSpace, SystemMatrices};
 use crate::uncertainty::Uncertainty;
 use crate::working::{WorkingData, WorkingRecord};
@@ -26,7 +27,7 @@ pub(super) fn effects(
     let estimate = uncertainty.steady_state_gain();
     let t_values = uncertainty.feedthrough_t();
     let direct = uncertainty.free_feedthrough();
-    let shares = shares(scaled, matrices);
+    let shares = shares(scaled, matrices, search.settings.offsets);
     let longest = scaled.records.iter().map(WorkingRecord::samples).max();
     let grid = frequencies(longest.unwrap_or(2));
     let responses = uncertainty.frequency_response_error(&grid);
@@ -87,10 +88,11 @@ fn frequencies(samples: usize) -> Vec<f64> {
 
 /// Variance of every input's simulated effect over that of the output, p×M. They add up to 1 only if
 /// the inputs are uncorrelated and there is no noise.
-fn shares(scaled: &WorkingData, matrices: &SystemMatrices) -> Mat<f64> {
+fn shares(scaled: &WorkingData, matrices: &SystemMatrices, offsets: OffsetChoice) -> Mat<f64> {
     let (m, p) = (scaled.inputs.len(), scaled.outputs.len());
     let initial = vec![0.0; matrices.order()];
     let mut shares = Mat::zeros(p, m);
+    let of_outputs = variances(scaled, offsets);
     let samples = scaled.samples() as f64;
     for j in 0..m {
         let mut sums = vec![[0.0; 2]; p];
@@ -107,8 +109,7 @@ fn shares(scaled: &WorkingData, matrices: &SystemMatrices) -> Mat<f64> {
         }
         for (i, [sum, squares]) in sums.into_iter().enumerate() {
             let mean = sum / samples;
-            // The outputs have unit variance.
-            shares[(i, j)] = (squares / samples - mean * mean).max(0.0);
+            shares[(i, j)] = (squares / samples - mean * mean).max(0.0) / of_outputs[i];
         }
     }
     shares

@@ -1,13 +1,13 @@
 //! Which inputs act within their own interval.
 
 use super::candidate::{Candidate, Care, Search};
-use super::settings::{Feedthrough, IdentificationSettings};
+use super::settings::{Feedthrough, IdentificationSettings, OffsetChoice};
 use crate::error::SysidError;
 use crate::input_fit::InputStructure;
 use crate::working::WorkingData;
 
 /// Where B and D are free at first: everywhere but where a setting says otherwise. The last channel
-/// is the constant.
+/// is the constant, which acts only where offsets are to be found.
 pub(super) fn first_structure(
     names: &[String],
     settings: &IdentificationSettings,
@@ -24,14 +24,14 @@ pub(super) fn first_structure(
         })
         .collect();
     dynamics.push(false);
-    feedthrough.push(true);
+    feedthrough.push(settings.offsets == OffsetChoice::Found);
     InputStructure {
         dynamics,
         feedthrough,
     }
 }
 
-/// Free entries of D, the offsets of the outputs included.
+/// Free entries of D, the offsets of the outputs included where they are free.
 pub(super) fn entries(structure: &InputStructure, outputs: usize) -> usize {
     structure.feedthrough.iter().filter(|&&free| free).count() * outputs
 }

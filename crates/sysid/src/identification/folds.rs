@@ -119,7 +119,7 @@ impl Fold {
         settings: &IdentificationSettings,
     ) -> Result<Self, SysidError> {
         Ok(Self {
-            bases: bases(training, horizons, &settings.weightings)?,
+            bases: bases(training, horizons, settings)?,
             training: training.with_constant(),
             held_out: held_out.with_constant(),
         })

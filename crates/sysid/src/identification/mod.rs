@@ -7,6 +7,7 @@ mod feedthrough;
 mod focus;
 mod folds;
 mod horizon;
+mod offsets;
 mod order;
 mod report;
 mod response;
@@ -23,7 +24,7 @@ pub use report::{
     UNIDENTIFIED_RESPONSE_RATIO,
 };
 pub use response::UncertainResponse;
-pub use settings::{Feedthrough, FocusChoice, IdentificationSettings};
+pub use settings::{Feedthrough, FocusChoice, IdentificationSettings, OffsetChoice};
 
 use candidate::{Basis, Candidate, Care, Search, bases};
 use evaluate::{
@@ -37,7 +38,7 @@ use order::{Trial, choose};
 use crate::error::SysidError;
 use crate::state_space::{StateSpace, SystemMatrices};
 use crate::uncertainty::Uncertainty;
-use crate::working::WorkingData;
+use crate::working::{Centre, WorkingData};
 
 /// Parts of every held-out record whose errors are compared.
 const PARTS: usize = 4;
@@ -106,7 +107,13 @@ pub fn identify_with(
 ) -> Result<Identification, SysidError> {
     let names = [data.input_names(), data.disturbance_names()].concat();
     settings.check(&names)?;
-    let scaled = WorkingData::new(data)?;
+    let scaled = WorkingData::about(
+        data,
+        match settings.offsets {
+            OffsetChoice::Found | OffsetChoice::Means => Centre::Means,
+            OffsetChoice::None => Centre::Origin,
+        },
+    )?;
     let all = scaled.with_constant();
     let splits = folds::split(&scaled, settings.folds)?;
     let of_whole = |error| folds::of_whole_records(error, &scaled, settings.folds);
@@ -147,7 +154,7 @@ pub fn identify_with(
     let order = trials[chosen].report.order;
 
     steps.next("choosing feedthrough and focus")?;
-    let found = bases(&scaled, &horizons, &settings.weightings)?;
+    let found = bases(&scaled, &horizons, settings)?;
     let mut starts = search.subspace(&all, &found, order)?;
     let mut best = search.refined(&all, &starts, Care::Rough)?;
     for candidate in &trials[chosen].candidates {
@@ -288,6 +295,7 @@ impl Search<'_> {
             horizon: last.horizon,
             weighting: last.weighting,
             singular_values: values.iter().map(|value| value / largest).collect(),
+            offsets: self.settings.offsets,
             focus: match focused.way {
                 Way::Prediction => FocusChoice::Prediction,
                 Way::Simulation | Way::Subspace => FocusChoice::Simulation,
@@ -302,6 +310,9 @@ impl Search<'_> {
             warnings: Vec::new(),
         };
         report.warnings = effects::warnings(&report, self.settings, radius);
+        report
+            .warnings
+            .extend(offsets::warnings(scaled, self.settings.offsets));
         Ok(Identification {
             model,
             report,

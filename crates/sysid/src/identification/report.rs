@@ -5,7 +5,7 @@ use std::fmt;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use super::order::OrderTrial;
-use super::settings::FocusChoice;
+use super::settings::{FocusChoice, OffsetChoice};
 use crate::subspace::Weighting;
 
 /// A steady-state gain whose standard error is above this fraction of it has no sign that could be relied
@@ -33,6 +33,9 @@ pub struct IdentificationReport {
     pub weighting: Weighting,
     /// Singular values of that estimate, relative to the largest.
     pub singular_values: Vec<f64>,
+    /// What was taken from the channels.
+    #[serde(default)]
+    pub offsets: OffsetChoice,
     /// What the model was refined for.
     pub focus: FocusChoice,
     /// Whether it was refined by prediction error, or is the subspace estimate itself.
@@ -200,6 +203,13 @@ impl fmt::Display for IdentificationReport {
                 (true, _) => "; refined on the simulated output, K afterwards",
             }
         )?;
+        match self.offsets {
+            OffsetChoice::Found => {}
+            OffsetChoice::Means => writeln!(f, "  offsets: the channels' means, nothing else")?,
+            OffsetChoice::None => {
+                writeln!(f, "  offsets: none, the model goes through the origin")?
+            }
+        }
         let fits = |fits: &[f64]| -> String {
             let fits: Vec<_> = fits.iter().map(|fit| format!("{fit:.1} %")).collect();
             fits.join(", ")

@@ -29,6 +29,28 @@ pub enum FocusChoice {
     Prediction,
 }
 
+/// What is taken from the channels, so that the model is one of deviations.
+///
+/// Recommended: [`Found`](Self::Found). A plant that works about an operating point does not go through
+/// the origin, and a record seldom begins at its mean; both are then no matter. The others are what
+/// tools do that are given a recording as it is, or with its means removed: they are there for
+/// comparison.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OffsetChoice {
+    /// The means of all channels, and a constant per output that is estimated with the model. Exact without
+    /// noise.
+    #[default]
+    Found,
+    /// The means of all channels over all records, nothing else. While transients last, the means are
+    /// not the operating point, and the model is wrong by as much.
+    Means,
+    /// Nothing: the model goes through the origin, y = G u in the units of the recording. Right for a
+    /// plant that does. Otherwise the gain of an input that stays away from 0 also explains what its
+    /// mean seems to do, and standard errors do not tell; a warning does.
+    None,
+}
+
 /// Settings of [`identify_with`](crate::identify_with). [`Default`] is what
 /// [`identify`](crate::identify) does: everything is found from the data.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -48,6 +70,8 @@ pub struct IdentificationSettings {
     /// Names of inputs or measured disturbances whose effect is held at zero: those that the data do
     /// not identify.
     pub without_effect: Vec<String>,
+    /// What is taken from the channels.
+    pub offsets: OffsetChoice,
     /// What the refinement minimises.
     pub focus: FocusChoice,
     /// Whether the subspace model is refined by prediction error at all.
@@ -73,6 +97,7 @@ impl Default for IdentificationSettings {
             weightings: vec![Weighting::Moesp, Weighting::Cva, Weighting::N4sid],
             feedthrough: Feedthrough::Automatic,
             without_effect: Vec::new(),
+            offsets: OffsetChoice::Found,
             focus: FocusChoice::Automatic,
             refine: true,
             stability_radius: 0.99999,

@@ -28,7 +28,7 @@ pub struct Channel {
     pub name: String,
     /// Operating point, in the channel's unit.
     pub offset: f64,
-    /// Typical size of deviations from it (standard deviation in the recording), above 0.
+    /// Typical size of deviations from it (their root mean square in the recording), above 0.
     pub scale: f64,
 }
 

@@ -1,0 +1,330 @@
+//! How sensitive the outcome of `sedan-s1` is to what the paper leaves open.
+//!
+//! One thing at a time is changed; the recordings are those of seeds 10 to 19, on which nothing was
+//! chosen; the course is driven as it is. Writes a table in Markdown on standard output.
+//!
+//! ```sh
+//! cargo run --release -p rollover-app --example sensitivity > docs/sensitivity.md
+//! ```
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use anyhow::{Context, Result};
+use deepc_core::program::Regularisation;
+use rollover_app::closed_loop::{self, Recorded, Run, SteeringProfile, Watch};
+use rollover_app::interrupt::Interrupt;
+use rollover_app::record::record;
+use rollover_app::scenario::{
+    ControllerSettings, DataSettings, ModelSettings, Prediction, ReferenceAhead, Scenario, load,
+};
+use rollover_app::summary::{RunIdentity, Summary};
+use rollover_app::terrain;
+use sysid::OffsetChoice;
+use sysid::lmpc::OffsetHandling;
+use vehicle_dyn::metrics::Outcome;
+
+const SEEDS: std::ops::Range<u64> = 10..20;
+/// Steering-wheel weight of 1/rad², per deg².
+const PER_RAD2: f64 = (std::f64::consts::PI / 180.0) * (std::f64::consts::PI / 180.0);
+/// Speed weight of 1/(m/s)², per (km/h)².
+const PER_M_S2: f64 = 1.0 / (3.6 * 3.6);
+
+/// One change to a scenario and to the controller in question.
+struct Variant {
+    /// Controller that is changed.
+    of: &'static str,
+    words: String,
+    change: Box<dyn Fn(&mut Scenario, &mut ControllerSettings) + Sync + Send>,
+}
+
+fn variant(
+    of: &'static str,
+    words: impl Into<String>,
+    change: impl Fn(&mut Scenario, &mut ControllerSettings) + Sync + Send + 'static,
+) -> Variant {
+    Variant {
+        of,
+        words: words.into(),
+        change: Box::new(change),
+    }
+}
+
+fn data(settings: &mut ControllerSettings) -> &mut DataSettings {
+    match &mut settings.prediction {
+        Prediction::Data(data) => data,
+        Prediction::Model(_) => unreachable!("only changes of RD-DeePC ask"),
+    }
+}
+
+fn model(settings: &mut ControllerSettings) -> &mut ModelSettings {
+    match &mut settings.prediction {
+        Prediction::Model(model) => model,
+        Prediction::Data(_) => unreachable!("only changes of the LMPC ask"),
+    }
+}
+
+fn per_column(lambda_g: f64) -> Regularisation {
+    Regularisation::per_column(lambda_g)
+}
+
+fn raw(lambda_g: f64) -> Regularisation {
+    Regularisation::raw(lambda_g)
+}
+
+fn variants() -> Vec<Variant> {
+    let mut all = Vec::new();
+    for of in ["rd-deepc-1", "rd-deepc-1-paper"] {
+        all.extend(shared(of));
+        all.push(variant(of, "λ_u = 1e4", |_, c| data(c).lambda_u = 1e4));
+        all.push(variant(of, "λ_u = 1e2", |_, c| data(c).lambda_u = 1e2));
+        for lambda_y in [1e4, 1e6, 1e10] {
+            let words = format!("λ_y = {lambda_y:.0e}");
+            all.push(variant(of, words, move |_, c| data(c).lambda_y = lambda_y));
+        }
+    }
+    let of = "rd-deepc-1";
+    for lambda_g in [6.0, 20.0, 180.0, 600.0] {
+        let words = format!(
+            "λ_g = {lambda_g} per column ({:.0e} raw)",
+            lambda_g * 3001.0
+        );
+        all.push(variant(of, words, move |_, c| {
+            data(c).regularisation = per_column(lambda_g);
+        }));
+    }
+    let of = "rd-deepc-1-paper";
+    for lambda_g in [1e3, 1e4, 1e5, 1e6] {
+        all.push(variant(
+            of,
+            format!("λ_g = {lambda_g:.0e} raw"),
+            move |_, c| {
+                data(c).regularisation = raw(lambda_g);
+            },
+        ));
+    }
+    all.push(variant(of, "λ_g = 100 per column", |_, c| {
+        data(c).regularisation = per_column(100.0);
+    }));
+    let of = "lmpc-1";
+    all.extend(shared(of));
+    all.push(variant(of, "order 4", |_, c| {
+        model(c).identification.order = Some(4);
+    }));
+    all.push(variant(of, "means removed", |_, c| {
+        model(c).identification.offsets = OffsetChoice::Means;
+    }));
+    all.push(variant(of, "raw data (through the origin)", |_, c| {
+        model(c).identification.offsets = OffsetChoice::None;
+    }));
+    all.push(variant(of, "no disturbance model", |_, c| {
+        model(c).offset_handling = OffsetHandling::None;
+    }));
+    all.push(variant(
+        of,
+        "order 4, raw data, no disturbance model",
+        |_, c| {
+            let model = model(c);
+            model.identification.order = Some(4);
+            model.identification.offsets = OffsetChoice::None;
+            model.offset_handling = OffsetHandling::None;
+        },
+    ));
+    all.push(variant(of, "speed gain held at zero", |_, c| {
+        model(c).identification.without_effect = vec!["target_speed_kmh".into()];
+    }));
+    all
+}
+
+/// What every method can be asked.
+fn shared(of: &'static str) -> Vec<Variant> {
+    let mut all = vec![variant(of, "as it is", |_, _| {})];
+    for limit in [0.8, 0.84, 0.88, 0.92, 0.95, 1.0] {
+        all.push(variant(of, format!("limit {limit} on LTR"), move |_, c| {
+            c.ltr_limit = limit;
+        }));
+    }
+    for past in [10, 20, 50] {
+        all.push(variant(of, format!("T_ini = {past}"), move |_, c| {
+            c.past_steps = past;
+        }));
+    }
+    for horizon in [50, 150] {
+        all.push(variant(of, format!("N = {horizon}"), move |_, c| {
+            c.horizon_steps = horizon;
+        }));
+    }
+    for moves in [2, 5] {
+        all.push(variant(
+            of,
+            format!("{moves} moves per solve"),
+            move |_, c| {
+                c.moves_per_solve = moves;
+            },
+        ));
+    }
+    all.push(variant(of, "u_r previewed, not held", |_, c| {
+        c.reference = ReferenceAhead::Preview;
+    }));
+    all.push(variant(of, "R per rad², (km/h)²", |_, c| {
+        c.input_weights.steering_wheel_per_deg2 *= PER_RAD2;
+    }));
+    all.push(variant(of, "R per rad², (m/s)²", |_, c| {
+        c.input_weights.steering_wheel_per_deg2 *= PER_RAD2;
+        c.input_weights.target_speed_per_kmh2 *= PER_M_S2;
+    }));
+    all.push(variant(of, "R per deg², (m/s)²", |_, c| {
+        c.input_weights.target_speed_per_kmh2 *= PER_M_S2;
+    }));
+    all.push(variant(of, "T = 3000 (30 s)", |s, _| {
+        s.recording.duration_s = 30.0;
+    }));
+    all.push(variant(of, "T = 2000 (20 s)", |s, _| {
+        s.recording.duration_s = 20.0;
+    }));
+    for noise in [3.0, 8.0] {
+        all.push(variant(
+            of,
+            format!("{noise}° of noise on the wheel"),
+            move |s, _| {
+                s.recording.steering_wheel_noise_deg = noise;
+            },
+        ));
+    }
+    all.push(variant(of, "1 km/h of noise on the speed", |s, _| {
+        s.recording.target_speed_noise_kmh = 1.0;
+    }));
+    all
+}
+
+/// What one run came to; nothing if the recording gives no controller.
+type Outcomes = Vec<Option<Summary>>;
+
+fn drive(variant: &Variant, seed: u64) -> Result<Option<Summary>> {
+    let mut scenario = load("sedan-s1")?;
+    let mut settings = scenario.controllers[variant.of].clone();
+    (variant.change)(&mut scenario, &mut settings);
+    let vehicle = vehicle_dyn::vehicles::find(&scenario.vehicle)?;
+    let interrupt = Interrupt::default();
+    let Ok((recording, _)) = record(&scenario, &vehicle, seed, &interrupt) else {
+        return Ok(None);
+    };
+    let watch = Watch {
+        interrupt: &interrupt,
+        progress: &|_| (),
+    };
+    let recorded = Recorded::new(&recording);
+    let Ok(built) = closed_loop::controller(&scenario, &settings, &recorded, watch) else {
+        return Ok(None);
+    };
+    let terrain = terrain::build(&scenario.ground, &scenario.course, &interrupt)?;
+    let preview = match settings.reference {
+        ReferenceAhead::Held => None,
+        ReferenceAhead::Preview => Some(SteeringProfile::record(
+            &scenario, &vehicle, &terrain, seed,
+        )?),
+    };
+    let run = Run {
+        seed,
+        preview,
+        controller: Some(built.controller),
+        ..Run::of_driver(&scenario, &vehicle, terrain)
+    };
+    let finished = closed_loop::run(run, None, &interrupt, || ())?;
+    let identity = RunIdentity {
+        speed_reference_kmh: scenario.speed_reference_kmh,
+        turns_m: scenario.course.turns_m(),
+        ..RunIdentity::default()
+    };
+    // Costs are compared with the paper's units, whatever was optimised.
+    let weights = load("sedan-s1")?.controllers[variant.of].input_weights;
+    Ok(Some(Summary::of_log(
+        identity,
+        finished.outcome,
+        &finished.rows,
+        Some(&weights),
+        scenario.sample_time_s,
+    )))
+}
+
+fn row(words: &str, runs: &[Option<Summary>]) -> String {
+    let made = || runs.iter().flatten();
+    let count = |holds: &dyn Fn(&Summary) -> bool| made().filter(|run| holds(run)).count();
+    let completed = count(&|run| run.outcome == Outcome::Completed);
+    let safe = count(&|run| run.outcome == Outcome::Completed && run.ltr_violation_s <= 0.0);
+    let rolled = count(&|run| run.outcome == Outcome::RolledOver);
+    let values = |of: fn(&Summary) -> f64| made().map(of).collect::<Vec<_>>();
+    let largest = |of| values(of).into_iter().fold(0.0_f64, f64::max);
+    let median = |of| {
+        let mut sorted = values(of);
+        sorted.sort_by(f64::total_cmp);
+        sorted.get(sorted.len().saturating_sub(1) / 2).copied()
+    };
+    let lowest = values(|run| run.speed_min_kmh)
+        .into_iter()
+        .fold(f64::INFINITY, f64::min);
+    let or_dash = |value: Option<f64>, digits: usize| {
+        value.map_or_else(|| "–".to_owned(), |v| format!("{v:.digits$}"))
+    };
+    format!(
+        "| {words} | {completed}/{n} | {safe} | {rolled} | {} | {:.2} | {:.1} m | {}° | {lowest:.1} | {} |",
+        or_dash(median(|run| run.ltr_abs_max), 3),
+        largest(|run| run.ltr_abs_max),
+        largest(|run| run.path_deviation_max_m),
+        or_dash(median(|run| run.steering_correction_max_deg), 0),
+        median(|run| run.cost.unwrap_or(f64::NAN))
+            .map_or_else(|| "–".to_owned(), |cost| format!("{cost:.1e}")),
+        n = runs.len(),
+    )
+}
+
+fn main() -> Result<()> {
+    let variants = variants();
+    let seeds: Vec<u64> = SEEDS.collect();
+    let jobs: Vec<(usize, u64)> = (0..variants.len())
+        .flat_map(|v| seeds.iter().map(move |&seed| (v, seed)))
+        .collect();
+    let next = AtomicUsize::new(0);
+    let found: Mutex<BTreeMap<(usize, u64), Result<Option<Summary>>>> = Mutex::default();
+    let workers = std::thread::available_parallelism().map_or(1, usize::from);
+    std::thread::scope(|scope| {
+        for _ in 0..workers {
+            scope.spawn(|| {
+                while let Some(&(v, seed)) = jobs.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let made = drive(&variants[v], seed)
+                        .with_context(|| format!("{}: {}", variants[v].of, variants[v].words));
+                    let mut found = found.lock().unwrap_or_else(|e| e.into_inner());
+                    found.insert((v, seed), made);
+                    eprint!("\r{} of {} runs", found.len(), jobs.len());
+                }
+            });
+        }
+    });
+    eprintln!();
+    let mut found = found.into_inner().unwrap_or_else(|e| e.into_inner());
+    let mut text = String::from(
+        "# How sensitive `sedan-s1` is to what the paper leaves open\n\n\
+         Written by `cargo run --release -p rollover-app --example sensitivity`. One thing is changed at a\n\
+         time; recording seeds 10 to 19, on which nothing was chosen; the course as it is. Medians are over the\n\
+         runs that were made; costs are in the paper's units whatever was optimised.\n",
+    );
+    let mut of = "";
+    for (v, variant) in variants.iter().enumerate() {
+        if variant.of != of {
+            of = variant.of;
+            write!(
+                text,
+                "\n## `{of}`\n\n| changed | completed | of these, \\|LTR\\| ≤ 1 | rolled over | max \\|LTR\\|, median | worst | off path, worst | correction, median | lowest km/h | cost, median |\n|---|---|---|---|---|---|---|---|---|---|\n"
+            )?;
+        }
+        let runs: Outcomes = seeds
+            .iter()
+            .map(|&seed| found.remove(&(v, seed)).context("a run was lost")?)
+            .collect::<Result<_>>()?;
+        writeln!(text, "{}", row(&variant.words, &runs))?;
+    }
+    print!("{text}");
+    Ok(())
+}
