@@ -292,13 +292,13 @@ fn road(scene: &Scene) -> Result<Option<Figure>> {
 
 /// Heights within a view as fields, dark where low; neighbours share one where there are too many.
 pub(super) fn heights(map: &TerrainMap, x: (f64, f64), y: (f64, f64)) -> Vec<Field> {
-    let known = map.heights_m.iter().copied().filter(|h| h.is_finite());
-    let (low, high) = known.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| {
+    let known = || map.heights_m.iter().copied().filter(|h| h.is_finite());
+    let (low, high) = known().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| {
         (low.min(h), high.max(h))
     });
     let span = (high - low).max(1e-9);
     let mut stride = 1;
-    while (map.columns / stride) * (map.rows / stride) > MOST_FIELDS {
+    while known().count() / (stride * stride) > MOST_FIELDS {
         stride += 1;
     }
     let size = stride as f64 * map.spacing_m;

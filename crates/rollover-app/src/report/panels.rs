@@ -12,7 +12,7 @@ use super::chart::{Backend, DrawResult, FONT, Field, GRID, INK, Series, draw_ser
 pub(super) const WIDTH: u32 = 560;
 const LETTERS: i32 = 15;
 /// Mean width of a letter, px, generous.
-const LETTER_WIDTH: f64 = 8.2;
+const LETTER_WIDTH: f64 = 7.8;
 const LEGEND_ROW: u32 = 24;
 const MARGIN: u32 = 8;
 const X_AREA: u32 = 42;
@@ -62,10 +62,10 @@ fn legend_rows<'a, 'b>(series: &'b [Series<'a>]) -> Vec<Vec<(f64, &'b Series<'a>
     let mut rows: Vec<Vec<(f64, &Series<'_>)>> = Vec::new();
     let mut x = f64::INFINITY;
     for line in series.iter().filter(|line| !line.name.is_empty()) {
-        let width = 44.0 + LETTER_WIDTH * line.name.chars().count() as f64;
+        let width = 40.0 + LETTER_WIDTH * line.name.chars().count() as f64;
         if x + width > f64::from(WIDTH) {
             rows.push(Vec::new());
-            x = f64::from(Y_AREA);
+            x = 24.0;
         }
         if let Some(row) = rows.last_mut() {
             row.push((x, line));

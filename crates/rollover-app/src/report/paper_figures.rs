@@ -10,7 +10,7 @@ use super::claims::{RIVERBED, SEDAN, TRUCK};
 use super::data::{Report, Role, Run, Scene};
 use super::figures::{Figure, WHEELS, colour, ended_early, extent, heights, line, series, trace};
 use super::panels::{FRAME, Panel, WIDTH, panels};
-use super::plots::{Limit, Look, looks};
+use super::plots::{Limit, Look, look, looks};
 use super::snapshot::snapshot;
 
 /// File names, without extension, of all figures of the paper; `-paper` may follow.
@@ -33,6 +33,12 @@ const PAIR: [(&str, &str); 2] = [("rd-deepc-1", "RD-DeePC"), ("lmpc-1", "LMPC")]
 const ALONE: u32 = 240;
 const AMONG: u32 = 150;
 
+/// Looks and widths of two lines that coincide: the second is seen on the first.
+const COINCIDENT: [(Look, u32); 2] = [
+    (look([122, 178, 224], [0, 0, 0], [0, 0]), 5),
+    (look([20, 40, 90], [0, 0, 0], [6, 5]), 2),
+];
+
 /// A quantity over time.
 struct Quantity {
     axis: &'static str,
@@ -48,7 +54,7 @@ const LTR: Quantity = Quantity {
 const SPEED: Quantity = Quantity {
     axis: "speed / (km/h)",
     column: "speed_kmh",
-    limit: Limit::None,
+    limit: Limit::TargetSpeed,
 };
 const TARGET_SPEED: Quantity = Quantity {
     axis: "target / (km/h)",
@@ -66,6 +72,8 @@ pub(super) struct Shown<'a> {
     pub(super) run: &'a Run,
     pub(super) name: &'static str,
     look: Look,
+    /// Of its line, px.
+    width: u32,
 }
 
 /// Draws the figures for which the report has the runs.
@@ -76,7 +84,10 @@ pub(super) fn paper_figures(report: &Report) -> Result<Vec<Figure>> {
     let scene = |name: &str| report.scenes.iter().find(|scene| scene.name == name);
     let mut all = Vec::new();
     if let Some(scene) = scene(SEDAN) {
-        let compared = cast(scene, &COMPARED, "");
+        let mut compared = cast(scene, &COMPARED, "");
+        for (one, (look, width)) in compared.iter_mut().zip(COINCIDENT) {
+            (one.look, one.width) = (look, width);
+        }
         if compared.len() == COMPARED.len() {
             all.extend(over_time(
                 "fig-comparison",
@@ -113,7 +124,10 @@ pub(super) fn paper_figures(report: &Report) -> Result<Vec<Figure>> {
                 }));
             }
         }
-        all.extend(road(scene)?);
+        // A single run is no reproduction of the paper.
+        if !all.is_empty() {
+            all.extend(road(scene)?);
+        }
     }
     for (name, figure) in [(TRUCK, "fig-truck"), (RIVERBED, "fig-riverbed")] {
         let Some(scene) = scene(name) else {
@@ -137,9 +151,9 @@ fn is(run: &Run, controller: &str, suffix: &str) -> bool {
     run.controller.strip_suffix(suffix) == Some(controller)
 }
 
-/// Whether more than the driver is shown.
+/// Whether there is something to compare.
 fn is_judged(shown: &[Shown<'_>]) -> bool {
-    shown.iter().any(|one| one.run.role == Role::Deepc)
+    shown.len() > 1 && shown.iter().any(|one| one.run.role == Role::Deepc)
 }
 
 /// The runs of some controllers with the settings that a suffix tells. The driver has none.
@@ -164,6 +178,7 @@ fn cast<'a>(
             run,
             name,
             look: looks[plain(&run.controller).unwrap_or(place)],
+            width: 2,
         }
     });
     shown.collect()
@@ -231,7 +246,7 @@ impl Shown<'_> {
             dash: self.look.dash,
             ..series(
                 self.name,
-                colour(self.look).stroke_width(2),
+                colour(self.look).stroke_width(self.width),
                 trace(self.run, quantity.column)?,
             )
         })

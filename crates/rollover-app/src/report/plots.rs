@@ -209,7 +209,7 @@ pub(super) struct Look {
     pub(super) dash: [u8; 2],
 }
 
-const fn look(light: [u8; 3], dark: [u8; 3], dash: [u8; 2]) -> Look {
+pub(super) const fn look(light: [u8; 3], dark: [u8; 3], dash: [u8; 2]) -> Look {
     Look { light, dark, dash }
 }
 

@@ -263,6 +263,18 @@ fn above(
             -0.5 * glass
         );
     }
+    // The outline of the second is on top: where both are at one place, both are seen.
+    let [_, state] = states;
+    let (px, py) = place(state.x_m, state.y_m);
+    let (length, width) = (shape.wheelbase_m + 2.0 * OVERHANG_M, 0.88 * shape.width_m);
+    let _ = writeln!(
+        svg,
+        "<rect x=\"{}\" y=\"{}\" width=\"{length}\" height=\"{width}\" rx=\"0.4\" fill=\"none\" stroke=\"{}\" stroke-width=\"0.2\" transform=\"translate({px:.1} {py:.1}) scale({scale:.3} -{scale:.3}) rotate({:.2})\"/>",
+        shape.cg_to_front_axle_m - shape.wheelbase_m - OVERHANG_M,
+        -0.5 * width,
+        css(both[1].rgb()),
+        state.yaw_deg
+    );
     let _ = writeln!(
         svg,
         "</g>\n<rect x=\"8\" y=\"{top}\" width=\"{}\" height=\"{ABOVE}\" fill=\"none\" stroke=\"#c9ced4\"/>\n<path d=\"M{} {}v5h{}v-5\" fill=\"none\" stroke=\"{SOFT}\" stroke-width=\"1.5\"/>\n<text x=\"{}\" y=\"{}\" text-anchor=\"middle\">5 m</text>",

@@ -40,7 +40,7 @@ fn a_folder_with_a_cut_log_is_reported_and_the_file_named() {
     assert_eq!(printed["problems"].as_array().map(Vec::len), Some(2));
     let page = text(&out.join("report.html"));
     assert_says(&page, &["out/cut/log.csv", "out/bad/log.csv"]);
-    assert!(out.join("figures/logs-ltr.svg").exists());
+    assert!(out.join("figures/scenes/logs-ltr.svg").exists());
     assert_says(
         &text(&out.join("tables/problems.csv")),
         &["out/bad/log.csv"],
@@ -116,7 +116,7 @@ fn a_run_is_reported_and_rebuilt_to_the_same_page() {
         "report.html",
         "log.mat",
         "scene.json",
-        "figures/sedan-s1-road.svg",
+        "figures/scenes/sedan-s1-road.svg",
         "tables/runs.csv",
     ] {
         assert!(out.join(name).exists(), "{name} is missing");

@@ -1,5 +1,7 @@
 //! The runs that judge a claim.
 
+use std::fmt::Write;
+
 use vehicle_dyn::metrics::Outcome;
 
 use crate::report::campaign::Campaign;
@@ -123,22 +125,22 @@ impl<'a> Cases<'a> {
         let values = |f: fn(&Summary) -> f64| self.runs().map(f).collect::<Vec<_>>();
         let ltr = values(|run| run.ltr_abs_max);
         if let (Some(median), Some(worst)) = (median(&ltr), ltr.iter().copied().reduce(f64::max)) {
-            words += &format!("; max |LTR| {median:.3} (worst {worst:.3})");
+            let _ = write!(words, "; max |LTR| {median:.3} (worst {worst:.3})");
         }
         let lowest = values(|run| run.speed_min_kmh);
         if let (Some(mean), Some(lowest)) = (
             median(&values(|run| run.speed_mean_kmh)),
             lowest.into_iter().reduce(f64::min),
         ) {
-            words += &format!("; mean speed {mean:.1} km/h (lowest {lowest:.1})");
+            let _ = write!(words, "; mean speed {mean:.1} km/h (lowest {lowest:.1})");
         }
         let off = values(|run| run.path_deviation_max_m);
         if let Some(worst) = off.into_iter().reduce(f64::max) {
-            words += &format!("; at most {worst:.1} m off the path");
+            let _ = write!(words, "; at most {worst:.1} m off the path");
         }
         let costs: Vec<f64> = self.runs().filter_map(|run| run.cost).collect();
         if let Some(cost) = median(&costs) {
-            words += &format!("; cost {cost:.3e}");
+            let _ = write!(words, "; cost {cost:.3e}");
         }
         words
     }

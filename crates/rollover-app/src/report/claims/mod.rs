@@ -123,10 +123,10 @@ impl<'a> Judge<'a> {
         holds: impl Fn(&Summary) -> bool,
     ) -> Option<Claim> {
         let count = cases.count(holds);
-        self.claim(words, cases, count, cases.words())
+        self.claim(words, cases, count, &cases.words())
     }
 
-    fn claim(&self, words: Words, cases: &Cases<'_>, count: Count, ours: String) -> Option<Claim> {
+    fn claim(&self, words: Words, cases: &Cases<'_>, count: Count, ours: &str) -> Option<Claim> {
         if cases.all.is_empty() {
             return None;
         }
@@ -180,7 +180,7 @@ impl<'a> Judge<'a> {
             holds: usize::from(agreement.agrees),
             of: 1,
         };
-        self.claim(words, &cases, count, agreement.to_string())
+        self.claim(words, &cases, count, &agreement.to_string())
     }
 
     fn faster(&self) -> Option<Claim> {
@@ -210,7 +210,7 @@ impl<'a> Judge<'a> {
             words,
             &cases,
             count,
-            "The times are in the table of costs and times.".into(),
+            "The times are in the table of costs and times.",
         )
     }
 
@@ -385,7 +385,7 @@ impl<'a> Judge<'a> {
             ),
             None => "In no pair do both complete and come back to the reference speed".into(),
         };
-        self.claim(words, first, count, ours)
+        self.claim(words, first, count, &ours)
     }
 
     /// Judged on pairs in which both complete: a rollover ends a run early and makes it cheap.
@@ -406,7 +406,7 @@ impl<'a> Judge<'a> {
             ),
             _ => "In no pair do both complete, so that their costs cannot be compared".into(),
         };
-        self.claim(words, ours, count, words_of)
+        self.claim(words, ours, count, &words_of)
     }
 
     /// Judged on pairs in which both complete.
@@ -432,7 +432,7 @@ impl<'a> Judge<'a> {
             ),
             None => "In no pair do both complete".into(),
         };
-        self.claim(words, ours, count, words_of)
+        self.claim(words, ours, count, &words_of)
     }
 }
 
