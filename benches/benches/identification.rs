@@ -1,7 +1,9 @@
 //! Subspace identification, from the recording to the model, when one size of the problem changes:
-//! samples N, horizon s (past and future), order n. Two inputs, one output, one thread.
+//! samples N, horizon s (past and future), order n; and `identify` as a whole. Two inputs, one output, one
+//! thread.
 
 use std::hint::black_box;
+use std::ops::ControlFlow;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use deepc_core::data::Dataset;
@@ -9,7 +11,9 @@ use deepc_core::hankel::FactorMethod;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
-use sysid::{SubspaceSettings, Weighting, subspace_model};
+use sysid::{
+    IdentificationSettings, Progress, SubspaceSettings, Weighting, identify_with, subspace_model,
+};
 
 const METHODS: [(&str, FactorMethod); 2] =
     [("QR", FactorMethod::BlockQr), ("Gram", FactorMethod::Gram)];
@@ -97,5 +101,25 @@ fn weightings(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, samples, horizons, orders, weightings);
+/// Everything found from the data, as a recording of the paper's length has it: the order given, and found.
+fn automatic(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("identification: identify");
+    group.sample_size(10);
+    let data = recording(3200);
+    for (name, order) in [("order given", Some(4)), ("automatic", None)] {
+        let settings = IdentificationSettings {
+            order,
+            ..IdentificationSettings::default()
+        };
+        group.bench_function(name, |b| {
+            b.iter(|| {
+                let go_on = &mut |_: &Progress| ControlFlow::Continue(());
+                identify_with(black_box(&data), &settings, go_on).expect("a model")
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, samples, horizons, orders, weightings, automatic);
 criterion_main!(benches);

@@ -9,6 +9,7 @@ use crate::summary::Summary;
 
 const NO_SPEED_EFFECT: &str = "lmpc-1-no-speed-effect";
 const RECOMMENDED: &str = "rd-deepc-1";
+const RAW: &str = "lmpc-1-paper-raw";
 const SMOOTH_DATA: &str = "rd-deepc-1-smooth-data";
 
 /// The reason for a verdict, where the campaign has a run that isolates it.
@@ -55,8 +56,9 @@ pub(super) fn reason(
         let smooth = of(SMOOTH_DATA);
         (!smooth.all.is_empty()).then(|| Reason {
             text: format!(
-                "Without the riverbed record in its data ({SMOOTH_DATA}) {} complete: that record is not what decides if the numbers are alike.",
-                smooth.count(completed)
+                "Of the same controller without the riverbed record in its data ({SMOOTH_DATA}) {} complete, with it {}. The ground moves LTR without any input, which the data explain by g and the past window by slack, instead of asking for the steering wheel.",
+                smooth.count(completed),
+                cases.count(completed)
             ),
             run: link(SMOOTH_DATA),
         })
@@ -77,9 +79,18 @@ fn speed_gain(campaign: &Campaign, cases: &Cases<'_>) -> Option<Reason> {
         .filter(|(_, verdict)| *verdict == EffectVerdict::Identified)
         .count();
     let negative = gains.iter().filter(|(gain, _)| *gain < 0.0).count();
+    let raw = Cases::new(campaign, cases.scenario, RAW);
+    let on_raw = if raw.all.is_empty() || !cases.controller.ends_with("-paper") {
+        String::new()
+    } else {
+        format!(
+            " On a model of the raw data ({RAW}) {} complete.",
+            raw.count(completed)
+        )
+    };
     Some(Reason {
         text: format!(
-            "The recording does not tell how the target speed acts on LTR: the steady-state gain comes out negative in {negative} of {} runs, and passes as identified in {known}. With that gain held at zero ({NO_SPEED_EFFECT}) the same controller completes {}.",
+            "The recording does not tell how the target speed acts on LTR: the steady-state gain comes out negative in {negative} of {} runs, and passes as identified in {known}. With that gain held at zero ({NO_SPEED_EFFECT}, our margin) {} complete.{on_raw}",
             gains.len(),
             control.count(completed)
         ),
