@@ -9,8 +9,8 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context, Result};
 use deepc_core::program::Regularisation;
@@ -32,12 +32,17 @@ const PER_RAD2: f64 = (std::f64::consts::PI / 180.0) * (std::f64::consts::PI / 1
 /// Speed weight of 1/(m/s)², per (km/h)².
 const PER_M_S2: f64 = 1.0 / (3.6 * 3.6);
 
+type Change = Box<dyn Fn(&mut Scenario, &mut ControllerSettings) + Sync + Send>;
+
+/// What the runs came to, by variant and seed; nothing if the recording gives no controller.
+type Found = BTreeMap<(usize, u64), Result<Option<Summary>>>;
+
 /// One change to a scenario and to the controller in question.
 struct Variant {
     /// Controller that is changed.
     of: &'static str,
     words: String,
-    change: Box<dyn Fn(&mut Scenario, &mut ControllerSettings) + Sync + Send>,
+    change: Change,
 }
 
 fn variant(
@@ -109,7 +114,9 @@ fn variants() -> Vec<Variant> {
         data(c).regularisation = per_column(100.0);
     }));
     let of = "lmpc-1";
-    all.extend(shared(of));
+    all.push(variant(of, "as it is", |_, _| {}));
+    all.extend(limits(of));
+    all.push(preview(of));
     all.push(variant(of, "order 4", |_, c| {
         model(c).identification.order = Some(4);
     }));
@@ -138,14 +145,26 @@ fn variants() -> Vec<Variant> {
     all
 }
 
-/// What every method can be asked.
+fn limits(of: &'static str) -> impl Iterator<Item = Variant> {
+    let limits = [0.8, 0.84, 0.88, 0.92, 0.95, 1.0];
+    limits.into_iter().map(move |limit| {
+        variant(of, format!("limit {limit} on LTR"), move |_, c| {
+            c.ltr_limit = limit;
+        })
+    })
+}
+
+fn preview(of: &'static str) -> Variant {
+    variant(of, "u_r previewed, not held", |_, c| {
+        c.reference = ReferenceAhead::Preview;
+    })
+}
+
+/// What RD-DeePC is asked with either settings.
 fn shared(of: &'static str) -> Vec<Variant> {
     let mut all = vec![variant(of, "as it is", |_, _| {})];
-    for limit in [0.8, 0.84, 0.88, 0.92, 0.95, 1.0] {
-        all.push(variant(of, format!("limit {limit} on LTR"), move |_, c| {
-            c.ltr_limit = limit;
-        }));
-    }
+    all.extend(limits(of));
+    all.push(preview(of));
     for past in [10, 20, 50] {
         all.push(variant(of, format!("T_ini = {past}"), move |_, c| {
             c.past_steps = past;
@@ -165,9 +184,6 @@ fn shared(of: &'static str) -> Vec<Variant> {
             },
         ));
     }
-    all.push(variant(of, "u_r previewed, not held", |_, c| {
-        c.reference = ReferenceAhead::Preview;
-    }));
     all.push(variant(of, "R per rad², (km/h)²", |_, c| {
         c.input_weights.steering_wheel_per_deg2 *= PER_RAD2;
     }));
@@ -198,9 +214,6 @@ fn shared(of: &'static str) -> Vec<Variant> {
     }));
     all
 }
-
-/// What one run came to; nothing if the recording gives no controller.
-type Outcomes = Vec<Option<Summary>>;
 
 fn drive(variant: &Variant, seed: u64) -> Result<Option<Summary>> {
     let mut scenario = load("sedan-s1")?;
@@ -287,7 +300,7 @@ fn main() -> Result<()> {
         .flat_map(|v| seeds.iter().map(move |&seed| (v, seed)))
         .collect();
     let next = AtomicUsize::new(0);
-    let found: Mutex<BTreeMap<(usize, u64), Result<Option<Summary>>>> = Mutex::default();
+    let found: Mutex<Found> = Mutex::default();
     let workers = std::thread::available_parallelism().map_or(1, usize::from);
     std::thread::scope(|scope| {
         for _ in 0..workers {
@@ -295,7 +308,7 @@ fn main() -> Result<()> {
                 while let Some(&(v, seed)) = jobs.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let made = drive(&variants[v], seed)
                         .with_context(|| format!("{}: {}", variants[v].of, variants[v].words));
-                    let mut found = found.lock().unwrap_or_else(|e| e.into_inner());
+                    let mut found = found.lock().unwrap_or_else(PoisonError::into_inner);
                     found.insert((v, seed), made);
                     eprint!("\r{} of {} runs", found.len(), jobs.len());
                 }
@@ -303,7 +316,7 @@ fn main() -> Result<()> {
         }
     });
     eprintln!();
-    let mut found = found.into_inner().unwrap_or_else(|e| e.into_inner());
+    let mut found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
     let mut text = String::from(
         "# How sensitive `sedan-s1` is to what the paper leaves open\n\n\
          Written by `cargo run --release -p rollover-app --example sensitivity`. One thing is changed at a\n\
@@ -319,7 +332,7 @@ fn main() -> Result<()> {
                 "\n## `{of}`\n\n| changed | completed | of these, \\|LTR\\| ≤ 1 | rolled over | max \\|LTR\\|, median | worst | off path, worst | correction, median | lowest km/h | cost, median |\n|---|---|---|---|---|---|---|---|---|---|\n"
             )?;
         }
-        let runs: Outcomes = seeds
+        let runs: Vec<Option<Summary>> = seeds
             .iter()
             .map(|&seed| found.remove(&(v, seed)).context("a run was lost")?)
             .collect::<Result<_>>()?;

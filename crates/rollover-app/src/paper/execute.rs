@@ -110,16 +110,16 @@ impl<'a> Execution<'a> {
         .into()
     }
 
-    /// The group that takes longest, because the timing goes with it, comes first.
+    /// The group that takes longest, because the timing goes with it, comes first, then the scenarios
+    /// from the last, whose runs take longer, so that the threads end together.
     fn groups(&self) -> Vec<Group> {
-        let scenes = 0..self.plan.scenes.len();
-        let of_scene = |scene| {
-            self.plan
-                .seeds
-                .iter()
-                .map(move |&seed| Group { scene, seed })
-        };
-        scenes.flat_map(of_scene).collect()
+        let mut groups = Vec::new();
+        for scene in (0..self.plan.scenes.len()).rev() {
+            let seeds = self.plan.seeds.iter();
+            groups.extend(seeds.map(|&seed| Group { scene, seed }));
+        }
+        groups.sort_by_key(|group| timed(&self.plan.group(group.scene, group.seed)).is_none());
+        groups
     }
 
     fn group(&self, group: Group) -> Result<()> {
@@ -128,8 +128,8 @@ impl<'a> Execution<'a> {
         let kept = runs.len() - due.len();
         self.kept.fetch_add(kept, Ordering::Relaxed);
         self.all.inc(kept as u64);
-        let timed = self.timed(&runs).filter(|run| !self.is_timed(run));
-        if due.is_empty() && timed.is_none() {
+        let to_time = timed(&runs).filter(|run| !self.is_timed(run));
+        if due.is_empty() && to_time.is_none() {
             return Ok(());
         }
         let data = self.recording(group)?;
@@ -141,7 +141,7 @@ impl<'a> Execution<'a> {
             self.made.fetch_add(1, Ordering::Relaxed);
             self.all.inc(1);
         }
-        match (timed, recorded) {
+        match (to_time, recorded) {
             (Some(run), Ok(recorded)) => self.time(run, &recorded),
             _ => Ok(()),
         }
@@ -238,14 +238,6 @@ impl<'a> Execution<'a> {
         std::fs::read_to_string(file).is_ok_and(|found| found == expected(program))
     }
 
-    /// The run whose group is timed: that of RD-DeePC, if all controllers of the table were driven and
-    /// logged beside it.
-    fn timed<'b>(&self, runs: &'b [PlannedRun]) -> Option<&'b PlannedRun> {
-        let logged = |name: &str| runs.iter().find(|r| r.logged && r.controller == name);
-        let [deepc, rd_deepc, lmpc] = TIMED.map(logged);
-        deepc.and(lmpc).and(rd_deepc)
-    }
-
     fn is_timed(&self, run: &PlannedRun) -> bool {
         self.out.join(TIMING_FILE).is_file()
             && self.same(&self.out.join(TIMING_FINGERPRINT_FILE), |program| {
@@ -308,4 +300,12 @@ impl<'a> Execution<'a> {
             None => Ok(()),
         }
     }
+}
+
+/// The run whose group is timed: that of RD-DeePC, if all controllers of the table are driven and
+/// logged beside it.
+fn timed(runs: &[PlannedRun]) -> Option<&PlannedRun> {
+    let logged = |name: &str| runs.iter().find(|r| r.logged && r.controller == name);
+    let [deepc, rd_deepc, lmpc] = TIMED.map(logged);
+    deepc.and(lmpc).and(rd_deepc)
 }

@@ -28,6 +28,8 @@ pub(super) struct Plan {
     pub(super) seeds: Vec<u64>,
     /// Names of the controllers; all if there are none.
     controllers: Vec<String>,
+    /// Whether the mirror images are driven, too.
+    mirror: bool,
     /// Moments at which the programs as written are timed.
     pub(super) moments: usize,
     /// Whether `DeePC` as written is timed, which takes most of the time.
@@ -82,6 +84,7 @@ impl Plan {
                 crate::timing::MOMENTS
             },
             deepc_as_written: !args.quick,
+            mirror: !args.quick,
         })
     }
 
@@ -105,7 +108,8 @@ impl Plan {
             for mirrored in [false, true] {
                 let once = runs_once(scenario, controller);
                 // The whole matrix decides as the reduced one does: one run shows it.
-                if (once && !shown) || (whole_matrix(scenario, controller) && mirrored) {
+                let whole = whole_matrix(scenario, controller);
+                if (once && !shown) || (mirrored && (whole || !self.mirror)) {
                     continue;
                 }
                 runs.push(PlannedRun {

@@ -84,7 +84,7 @@ pub enum ScenarioError {
         /// Whose ground it is.
         of: GroundOf,
         /// What is wrong and what to do.
-        source: GroundError,
+        source: Box<GroundError>,
     },
     /// A course cannot be built or does not fit.
     #[error("{origin}: {field}: {message}")]
@@ -392,7 +392,7 @@ impl Check<'_> {
         checked.map_err(|source| ScenarioError::Ground {
             origin: self.origin.to_owned(),
             of,
-            source,
+            source: Box::new(source),
         })
     }
 

@@ -119,13 +119,11 @@ impl Search<'_> {
         care: Care,
     ) -> Result<Candidate, SysidError> {
         let shared = || -> Result<_, SysidError> {
-            match with_gain.get() {
-                Some(known) => Ok(known.clone()),
-                None => {
-                    let found = self.with_gain(data, simulation, care)?;
-                    Ok(with_gain.get_or_init(|| found).clone())
-                }
+            if let Some(known) = with_gain.get() {
+                return Ok(known.clone());
             }
+            let found = self.with_gain(data, simulation, care)?;
+            Ok(with_gain.get_or_init(|| found).clone())
         };
         let model = match way {
             Way::Simulation => shared()?,

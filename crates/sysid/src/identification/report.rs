@@ -205,9 +205,11 @@ impl fmt::Display for IdentificationReport {
         )?;
         match self.offsets {
             OffsetChoice::Found => {}
-            OffsetChoice::Means => writeln!(f, "  offsets: the channels' means, nothing else")?,
+            OffsetChoice::Means => {
+                writeln!(f, "  offsets: the channels' means, nothing else")?;
+            }
             OffsetChoice::None => {
-                writeln!(f, "  offsets: none, the model goes through the origin")?
+                writeln!(f, "  offsets: none, the model goes through the origin")?;
             }
         }
         let fits = |fits: &[f64]| -> String {

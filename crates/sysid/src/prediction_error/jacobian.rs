@@ -328,7 +328,7 @@ impl<'a> Rows<'a> {
             let mut rows = block.subrows_mut(0, count * p);
             for l in 0..p {
                 let mut rows = rows.as_mut().subrows_mut(l * count, count);
-                self.initial_columns(response, basis, k, l, rows.as_mut());
+                initial_columns(response, basis, k, l, rows.as_mut());
                 matmul(
                     rows.as_mut().subcols_mut(initial, local),
                     Accum::Replace,
@@ -345,26 +345,6 @@ impl<'a> Rows<'a> {
             }
             take(rows, k);
             k += count;
-        }
-    }
-
-    fn initial_columns(
-        &self,
-        response: &FreeResponse,
-        basis: &Mat<f64>,
-        k: usize,
-        l: usize,
-        mut rows: MatMut<'_, f64>,
-    ) {
-        let kept = response.kept().saturating_sub(k).min(rows.nrows());
-        for j in 0..basis.ncols() {
-            let basis = basis.col_as_slice(j);
-            let (top, mut rest) = rows.as_mut().col_mut(j).split_at_row_mut(kept);
-            for (step, value) in top.iter_mut().enumerate() {
-                let free = response.at(k + step, l);
-                *value = -basis.iter().zip(free).map(|(b, r)| b * r).sum::<f64>();
-            }
-            rest.fill(0.0);
         }
     }
 
@@ -393,5 +373,25 @@ impl<'a> Rows<'a> {
             before += record.samples;
         }
         full
+    }
+}
+
+/// Columns of the initial states in the rows of output `l` from sample `k` on.
+fn initial_columns(
+    response: &FreeResponse,
+    basis: &Mat<f64>,
+    k: usize,
+    l: usize,
+    mut rows: MatMut<'_, f64>,
+) {
+    let kept = response.kept().saturating_sub(k).min(rows.nrows());
+    for j in 0..basis.ncols() {
+        let basis = basis.col_as_slice(j);
+        let (top, mut rest) = rows.as_mut().col_mut(j).split_at_row_mut(kept);
+        for (step, value) in top.iter_mut().enumerate() {
+            let free = response.at(k + step, l);
+            *value = -basis.iter().zip(free).map(|(b, r)| b * r).sum::<f64>();
+        }
+        rest.fill(0.0);
     }
 }
