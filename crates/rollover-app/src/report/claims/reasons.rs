@@ -5,9 +5,11 @@ use sysid::EffectVerdict;
 use super::cases::{Cases, completed, median};
 use crate::report::campaign::Campaign;
 use crate::report::data::{Reason, RunLink, Verdict};
+use crate::scenario::FLOOR;
 use crate::summary::Summary;
 
 const NO_SPEED_EFFECT: &str = "lmpc-1-no-speed-effect";
+const LMPC: &str = "lmpc-1";
 const RECOMMENDED: &str = "rd-deepc-1";
 const RAW: &str = "lmpc-1-paper-raw";
 const SMOOTH_DATA: &str = "rd-deepc-1-smooth-data";
@@ -25,46 +27,92 @@ pub(super) fn reason(
     if verdict == Verdict::Reproduced {
         return None;
     }
-    let of = |controller| Cases::new(campaign, cases.scenario, controller);
-    let link = |controller: &str| {
-        Some(RunLink {
-            scene: cases.scenario.into(),
-            label: controller.into(),
-        })
-    };
-    if cases.controller.ends_with("-paper") && id.contains("rd-deepc") {
-        let recommended = of(RECOMMENDED);
-        (!recommended.all.is_empty()).then(|| Reason {
-            text: format!(
-                "The paper's limit 1 is where the wheels lift and the steering gain vanishes, and so small a weight on g moves the predicted LTR rather than the steering wheel: the largest correction is {} in the median. With a margin and a larger weight ({RECOMMENDED}) it is {}, and {} complete.",
-                correction(cases),
-                correction(&recommended),
-                recommended.count(completed)
-            ),
-            run: link(RECOMMENDED),
-        })
-    } else if id.starts_with("s1-speed-recovery") {
-        Some(Reason {
-            text: format!(
+    if cases.controller.starts_with("rd-deepc") && cases.controller.ends_with("-paper") {
+        return margin(campaign, cases);
+    }
+    match id {
+        "s1-speed-recovery" => Some(told(
+            cases,
+            cases.controller,
+            format!(
                 "The rescue is by steering: the target speed of {} stays within {} km/h of its reference in the median run, so that the weight on it matters little.",
                 cases.controller,
                 speed_moves(cases)
             ),
-            run: link(cases.controller),
-        })
-    } else if id.starts_with("s3-rd-deepc") {
-        let smooth = of(SMOOTH_DATA);
-        (!smooth.all.is_empty()).then(|| Reason {
-            text: format!(
-                "Of the same controller without the riverbed record in its data ({SMOOTH_DATA}) {} complete, with it {}. The ground moves LTR without any input, which the data explain by g and the past window by slack, instead of asking for the steering wheel.",
-                smooth.count(completed),
-                cases.count(completed)
+        )),
+        "s1-cost" => Some(told(
+            cases,
+            LMPC,
+            format!(
+                "RD-DeePC corrects the steering wheel by {} in the median, at a price of 1 per deg² and step; where the LMPC completes it moves the target speed, at 5e-4 per (km/h)²: by {} km/h in the median. With these weights a degree costs as much as 45 km/h.",
+                correction(cases),
+                speed_moves(&Cases::new(campaign, cases.scenario, LMPC))
             ),
-            run: link(SMOOTH_DATA),
-        })
-    } else {
-        None
+        )),
+        "s2-rd-deepc" => slowing_down(campaign, cases),
+        "s3-rd-deepc" => riverbed_record(campaign, cases),
+        "table-time" => Some(told(
+            cases,
+            cases.controller,
+            "Both programs hold 600 dense rows. The interior-point solver used for both eliminates the 3001 or 600 columns of g, on which there is only a diagonal weight, first, so that their number counts for less than in the paper's solver. Condensed, g is gone from both before the first step, and there is no difference left to make.".into(),
+        )),
+        _ => None,
     }
+}
+
+fn told(cases: &Cases<'_>, run: &str, text: String) -> Reason {
+    Reason {
+        text,
+        run: Some(RunLink {
+            scene: cases.scenario.into(),
+            label: run.into(),
+        }),
+    }
+}
+
+/// The paper's settings of RD-DeePC beside the recommended ones.
+fn margin(campaign: &Campaign, cases: &Cases<'_>) -> Option<Reason> {
+    let recommended = Cases::new(campaign, cases.scenario, RECOMMENDED);
+    if recommended.all.is_empty() {
+        return None;
+    }
+    let text = format!(
+        "The paper's limit 1 is where the wheels lift and the steering gain vanishes, and so small a weight on g moves the predicted LTR rather than the steering wheel: the largest correction is {} in the median. With a margin and a larger weight ({RECOMMENDED}) it is {}, and {} complete.",
+        correction(cases),
+        correction(&recommended),
+        recommended.count(completed)
+    );
+    Some(told(cases, RECOMMENDED, text))
+}
+
+/// What the lowest target speed alone does.
+fn slowing_down(campaign: &Campaign, cases: &Cases<'_>) -> Option<Reason> {
+    let floor = Cases::new(campaign, cases.scenario, FLOOR);
+    let ltr =
+        |cases: &Cases<'_>| median(&cases.runs().map(|run| run.ltr_abs_max).collect::<Vec<_>>());
+    let (ours, floors) = (ltr(cases)?, ltr(&floor)?);
+    let text = format!(
+        "{} complete, but with a largest |LTR| of {ours:.3} in the median: a moment above the limit is enough for this claim. The driver held at the lowest target speed ({FLOOR}) stays at {floors:.3}. Slowing down would do, but the data do not tell that it helps: the target speed moves by {} km/h in the median.",
+        cases.count(completed),
+        speed_moves(cases)
+    );
+    Some(told(cases, FLOOR, text))
+}
+
+/// What the record of the riverbed adds.
+fn riverbed_record(campaign: &Campaign, cases: &Cases<'_>) -> Option<Reason> {
+    let smooth = Cases::new(campaign, cases.scenario, SMOOTH_DATA);
+    if smooth.all.is_empty() {
+        return None;
+    }
+    let text = format!(
+        "Of the same controller without the riverbed record in its data ({SMOOTH_DATA}) {} complete, with it {}. The ground moves LTR without any input, which the data explain by g and the past window by slack, instead of asking for the steering wheel: the largest correction is {} with the record and {} without it, in the median.",
+        smooth.count(completed),
+        cases.count(completed),
+        correction(cases),
+        correction(&smooth)
+    );
+    Some(told(cases, SMOOTH_DATA, text))
 }
 
 /// What the models make of the target speed, and the LMPC without an opinion on it.
