@@ -141,6 +141,8 @@ fn variants() -> Vec<Variant> {
     all.push(variant(of, "speed gain held at zero", |_, c| {
         model(c).identification.without_effect = vec!["target_speed_kmh".into()];
     }));
+    let sections = ["rd-deepc-1", "rd-deepc-1-paper", "lmpc-1"];
+    all.sort_by_key(|v| sections.iter().position(|of| *of == v.of));
     all
 }
 

@@ -139,7 +139,7 @@ pub struct ReportArgs {
 /// Arguments of `paper`.
 #[derive(Debug, Args)]
 pub struct PaperArgs {
-    /// A first look: two recording seeds, no mirror image, and the slowest program is not timed.
+    /// A first look: one recording seed, no mirror image, and the slowest program is not timed.
     #[arg(long)]
     pub quick: bool,
     /// Recording seeds; the logs of the first are kept. [default: 10-19, which no setting was chosen on]

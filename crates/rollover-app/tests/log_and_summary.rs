@@ -193,7 +193,17 @@ fn a_summary_counts_what_the_log_holds() {
 
 #[test]
 fn summary_json_has_the_fields_programs_rely_on() {
-    let summary = Summary::of_log(identity(), Outcome::RolledOver, &rows(3), None, 0.01);
+    let weights = InputWeights {
+        steering_wheel_per_deg2: 1.0,
+        target_speed_per_kmh2: 5e-4,
+    };
+    let summary = Summary::of_log(
+        identity(),
+        Outcome::RolledOver,
+        &rows(3),
+        Some(&weights),
+        0.01,
+    );
     let json = serde_json::to_value(&summary).expect("a summary is JSON");
     let fields = [
         "scenario",

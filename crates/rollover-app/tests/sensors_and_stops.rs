@@ -279,7 +279,7 @@ fn a_command_that_is_no_number_stops_the_run_with_its_time_and_keeps_the_log() {
         let time = format!("{:.2} s", fails_at as f64 * 0.01);
         for piece in [
             log.display().to_string(),
-            format!("holds the {fails_at} steps before"),
+            format!("holds the {fails_at} steps taken"),
             format!("stopped after {time}"),
             format!("command handwheel_rad = NaN at {time}"),
         ] {

@@ -17,7 +17,7 @@ use crate::toml_place::suggested;
 /// Recording seeds that no setting was chosen on.
 const JUDGED_SEEDS: std::ops::Range<u64> = 10..20;
 /// Seeds of a quick look.
-const QUICK_SEEDS: usize = 2;
+const QUICK_SEEDS: usize = 1;
 /// Moments at which the programs as written are solved in a quick look.
 const QUICK_MOMENTS: usize = 1;
 

@@ -130,7 +130,7 @@ impl Results {
             print_line(&format!("\n{table}"))?;
         }
         print_line(&format!(
-            "\n{} runs made, {} were there already; {} could not be made\nreport: {}\nresults for programs: {}",
+            "\n{} runs made, {} were there already; of all, {} have no controller\nreport: {}\nresults for programs: {}",
             made.now,
             made.before,
             self.campaign.failures.len(),

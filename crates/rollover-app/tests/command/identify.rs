@@ -247,10 +247,7 @@ fn offsets_can_be_the_means_or_none() {
     let folder = folder();
     write(&folder.path().join("tanks.csv"), &tanks(300, 8));
     let offsets = |choice: &str| {
-        let printed = succeed(
-            folder.path(),
-            &with(&["--order", "2", "--offsets", choice, "--out", "."]),
-        );
+        let printed = succeed(folder.path(), &with(&["--offsets", choice, "--out", "."]));
         let model = StateSpace::load(folder.path().join("model.json")).expect("a model");
         let outputs: Vec<f64> = model.outputs().iter().map(|c| c.offset).collect();
         (printed, outputs)

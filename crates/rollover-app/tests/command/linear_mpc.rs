@@ -98,7 +98,7 @@ fn settings_of_an_identification_are_checked_on_loading() {
             "`target_speed_kmh`",
         ],
     );
-    let message = fail_with_controller(controller, "order = 4", "offsets = \"raw\"");
+    let message = fail_with_controller(controller, "offsets = \"means\"", "offsets = \"raw\"");
     assert_says(
         &message,
         &["mine.toml", "line", "`raw`", "`found`, `means`, `none`"],
