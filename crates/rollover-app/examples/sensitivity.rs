@@ -171,11 +171,7 @@ fn shared(of: &'static str) -> Vec<Variant> {
             c.past_steps = past;
         }));
     }
-    for horizon in [50] {
-        all.push(variant(of, format!("N = {horizon}"), move |_, c| {
-            c.horizon_steps = horizon;
-        }));
-    }
+    all.push(variant(of, "N = 50", |_, c| c.horizon_steps = 50));
     for moves in [2, 5] {
         all.push(variant(
             of,
@@ -198,15 +194,9 @@ fn shared(of: &'static str) -> Vec<Variant> {
     all.push(variant(of, "T = 3000 (30 s)", |s, _| {
         s.recording.duration_s = 30.0;
     }));
-    for noise in [3.0] {
-        all.push(variant(
-            of,
-            format!("{noise}° of noise on the wheel"),
-            move |s, _| {
-                s.recording.steering_wheel_noise_deg = noise;
-            },
-        ));
-    }
+    all.push(variant(of, "3° of noise on the wheel", |s, _| {
+        s.recording.steering_wheel_noise_deg = 3.0;
+    }));
     all.push(variant(of, "1 km/h of noise on the speed", |s, _| {
         s.recording.target_speed_noise_kmh = 1.0;
     }));

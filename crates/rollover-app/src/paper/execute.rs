@@ -7,6 +7,7 @@ use std::sync::{Mutex, PoisonError};
 use anyhow::{Context, Result};
 use deepc_core::data::Dataset;
 use indicatif::ProgressBar;
+use serde::de::DeserializeOwned;
 
 use super::fingerprint::Program;
 use super::plan::{Plan, PlannedRun};
@@ -20,7 +21,8 @@ use crate::record::{self, record};
 use crate::report::{FAILURE_FILE, Failure, LOG_FILE, SUMMARY_FILE, TIMING_FILE};
 use crate::run_log;
 use crate::scenario::{DRIVER, FLOOR};
-use crate::timing::{self, Follow, LoggedRun, Timing};
+use crate::summary::Summary;
+use crate::timing::{self, Follow, LoggedRun, Timing, TimingTable};
 
 /// The controllers of the table of costs and times: whole matrix, reduced matrix, model.
 const TIMED: [&str; 3] = ["deepc-1", "rd-deepc-1", "lmpc-1"];
@@ -223,9 +225,9 @@ impl<'a> Execution<'a> {
     /// Whether a run's results are there, and are what would be made now.
     fn is_there(&self, run: &PlannedRun) -> bool {
         let folder = self.out.join(self.plan.folder(run));
-        let there = |name: &str| folder.join(name).is_file();
-        let whole = there(SUMMARY_FILE) && (!run.logged || there(LOG_FILE));
-        (whole || there(FAILURE_FILE))
+        let whole = reads::<Summary>(&folder.join(SUMMARY_FILE))
+            && (!run.logged || folder.join(LOG_FILE).is_file());
+        (whole || reads::<Failure>(&folder.join(FAILURE_FILE)))
             && self.same(&folder.join(FINGERPRINT_FILE), |program| {
                 program.of_run(self.plan, run)
             })
@@ -239,7 +241,7 @@ impl<'a> Execution<'a> {
     }
 
     fn is_timed(&self, run: &PlannedRun) -> bool {
-        self.out.join(TIMING_FILE).is_file()
+        reads::<TimingTable>(&self.out.join(TIMING_FILE))
             && self.same(&self.out.join(TIMING_FINGERPRINT_FILE), |program| {
                 program.of_timing(self.plan, run)
             })
@@ -300,6 +302,11 @@ impl<'a> Execution<'a> {
             None => Ok(()),
         }
     }
+}
+
+/// Whether a file is there and holds what it should.
+fn reads<T: DeserializeOwned>(file: &Path) -> bool {
+    std::fs::read(file).is_ok_and(|text| serde_json::from_slice::<T>(&text).is_ok())
 }
 
 /// The run whose group is timed: that of RD-DeePC, if all controllers of the table are driven and

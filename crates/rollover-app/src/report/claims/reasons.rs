@@ -138,7 +138,7 @@ fn speed_gain(campaign: &Campaign, cases: &Cases<'_>) -> Option<Reason> {
     };
     Some(Reason {
         text: format!(
-            "The recording does not tell how the target speed acts on LTR: the steady-state gain comes out negative in {negative} of {} runs, and passes as identified in {known}. With that gain held at zero ({NO_SPEED_EFFECT}, our margin) {} complete.{on_raw}",
+            "The recording hardly tells how the target speed acts on LTR: the steady-state gain comes out negative in {negative} of {} runs, and passes as identified in {known}. With that gain held at zero ({NO_SPEED_EFFECT}, our margin) {} complete.{on_raw}",
             gains.len(),
             control.count(completed)
         ),
