@@ -38,6 +38,19 @@ pub fn write_whole(path: &Path, contents: impl AsRef<[u8]>) -> Result<()> {
     })
 }
 
+/// Removes an earlier result, if there is one: beside fresh ones it would lie.
+///
+/// # Errors
+/// Names the file that cannot be removed.
+pub fn remove_old_file(file: &Path) -> Result<()> {
+    match std::fs::remove_file(file) {
+        Err(e) if e.kind() != ErrorKind::NotFound => {
+            Err(e).with_context(|| format!("cannot replace {}", file.display()))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Writes a value as a JSON file.
 ///
 /// # Errors

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use indicatif::ProgressBar;
 use sysid::{Identification, Progress};
 use vehicle_dyn::parameters::VehicleParameters;
@@ -10,7 +10,7 @@ use vehicle_dyn::terrain::Terrain;
 
 use crate::closed_loop::{self, Built, Recorded, Run, SteeringProfile, Watch};
 use crate::interrupt::Interrupt;
-use crate::output::{create_folder, write_json, write_whole};
+use crate::output::{create_folder, remove_old_file, write_json, write_whole};
 use crate::progress;
 use crate::report::{
     self, FAILURE_FILE, LOG_FILE, REPORT_FILE, SCENE_FILE, SUMMARY_FILE, SceneFile,
@@ -180,13 +180,7 @@ pub(crate) fn remove_old_results(folder: &Path) -> Result<()> {
         IDENTIFICATION_TEXT,
         IDENTIFICATION_JSON,
     ] {
-        let old = folder.join(name);
-        match std::fs::remove_file(&old) {
-            Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
-                return Err(e).with_context(|| format!("cannot replace {}", old.display()));
-            }
-            _ => {}
-        }
+        remove_old_file(&folder.join(name))?;
     }
     report::remove_old(&folder.join(REPORT_FILE))
 }

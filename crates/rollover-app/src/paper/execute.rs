@@ -20,7 +20,6 @@ use crate::progress;
 use crate::record::{self, record};
 use crate::report::{FAILURE_FILE, Failure, LOG_FILE, SUMMARY_FILE, TIMING_FILE};
 use crate::run_log;
-use crate::scenario::{DRIVER, FLOOR};
 use crate::summary::Summary;
 use crate::timing::{self, Follow, LoggedRun, Timing, TimingTable};
 
@@ -173,7 +172,7 @@ impl<'a> Execution<'a> {
         let scenario = &driven.scenario;
         let out = self.out.join(self.plan.folder(run));
         let bar = step_bar(scenario, &run.controller);
-        let by_data = ![DRIVER, FLOOR].contains(&run.controller.as_str());
+        let by_data = scenario.controllers.contains_key(&run.controller);
         let job = Job {
             scenario,
             vehicle: &scene.vehicle,
@@ -214,12 +213,9 @@ impl<'a> Execution<'a> {
             }
         }
         bar.finish_and_clear();
-        match self.program {
-            Some(program) => {
-                write_whole(&out.join(FINGERPRINT_FILE), program.of_run(self.plan, run))
-            }
-            None => Ok(()),
-        }
+        self.sign(&out.join(FINGERPRINT_FILE), |program| {
+            program.of_run(self.plan, run)
+        })
     }
 
     /// Whether a run's results are there, and are what would be made now.
@@ -238,6 +234,12 @@ impl<'a> Execution<'a> {
             return false;
         };
         std::fs::read_to_string(file).is_ok_and(|found| found == expected(program))
+    }
+
+    /// Writes what [`Self::same`] looks for.
+    fn sign(&self, file: &Path, fingerprint: impl Fn(Program) -> String) -> Result<()> {
+        self.program
+            .map_or(Ok(()), |program| write_whole(file, fingerprint(program)))
     }
 
     fn is_timed(&self, run: &PlannedRun) -> bool {
@@ -294,13 +296,9 @@ impl<'a> Execution<'a> {
         .context("the table of costs and times")?;
         bar.finish_and_clear();
         write_json(&self.out.join(TIMING_FILE), &table)?;
-        match self.program {
-            Some(program) => write_whole(
-                &self.out.join(TIMING_FINGERPRINT_FILE),
-                program.of_timing(self.plan, run),
-            ),
-            None => Ok(()),
-        }
+        self.sign(&self.out.join(TIMING_FINGERPRINT_FILE), |program| {
+            program.of_timing(self.plan, run)
+        })
     }
 }
 

@@ -21,7 +21,7 @@ use anyhow::Result;
 use crate::campaign::job::cores;
 use crate::cli::PaperArgs;
 use crate::interrupt::Interrupt;
-use crate::output::{create_folder, print_json, write_json};
+use crate::output::{create_folder, print_json, remove_old_file, write_json};
 use crate::report::{self, CAMPAIGN_FILE, CampaignFile, REPORT_FILE};
 use execute::Execution;
 use plan::Plan;
@@ -35,7 +35,7 @@ pub fn paper(args: &PaperArgs, interrupt: &Interrupt) -> Result<()> {
     let out = &args.out;
     create_folder(out)?;
     report::remove_old(&out.join(REPORT_FILE))?;
-    results::remove(out)?;
+    remove_old_file(&out.join(results::RESULTS_FILE))?;
     let folders = plan.runs().map(|run| plan.folder(&run));
     write_json(
         &out.join(CAMPAIGN_FILE),

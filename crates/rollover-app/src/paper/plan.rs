@@ -10,7 +10,7 @@ use crate::campaign::load_vehicle;
 use crate::cli::PaperArgs;
 use crate::interrupt::Interrupt;
 use crate::report::claims;
-use crate::scenario::{self, DRIVER, DataMatrix, FLOOR, Prediction, Scenario};
+use crate::scenario::{self, DataMatrix, Prediction, Scenario};
 use crate::terrain;
 use crate::toml_place::suggested;
 
@@ -161,7 +161,8 @@ fn check_controllers(names: &[String], scenes: &[Scene]) -> Result<()> {
 
 /// Whether every seed would give the same run, or one shows enough.
 fn runs_once(scenario: &Scenario, controller: &str) -> bool {
-    let without_data = [DRIVER, FLOOR].contains(&controller) && scenario.sensors.is_empty();
+    let without_data =
+        !scenario.controllers.contains_key(controller) && scenario.sensors.is_empty();
     without_data || whole_matrix(scenario, controller)
 }
 

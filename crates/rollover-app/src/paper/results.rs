@@ -13,18 +13,7 @@ use crate::summary::Summary;
 use crate::timing::{Agreement, TimingRow};
 
 /// The results for programs.
-const RESULTS_FILE: &str = "paper.json";
-
-/// Removes an earlier campaign's results: beside fresh runs they would lie.
-pub(super) fn remove(out: &Path) -> Result<()> {
-    let file = out.join(RESULTS_FILE);
-    match std::fs::remove_file(&file) {
-        Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
-            Err(e).with_context(|| format!("cannot replace {}", file.display()))
-        }
-        _ => Ok(()),
-    }
-}
+pub(super) const RESULTS_FILE: &str = "paper.json";
 
 /// `paper.json`. Times apart (`step_time_us` of the runs, all of `timing`), it is the same for the same
 /// command.

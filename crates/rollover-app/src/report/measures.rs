@@ -58,7 +58,7 @@ pub fn run_figures(columns: &Columns, weights: Option<&InputWeights>) -> RunFigu
         steering_correction_max_deg: abs_max(CORRECTION),
         cost: weights.and_then(|weights| cost(columns, weights)),
         fallback_steps: known(STATUS).map(|codes| codes.filter(|c| fallback(*c)).count()),
-        step_time_median_us: times().and_then(|times| median(times.collect())),
+        step_time_median_us: times().and_then(|times| median(&times.collect::<Vec<_>>())),
         step_time_max_us: times().and_then(|times| times.reduce(f64::max)),
     }
 }
@@ -122,10 +122,11 @@ pub fn outcome(columns: &Columns, road_width_m: Option<f64>) -> Option<Outcome> 
     })
 }
 
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    // Nearest rank: always a value that occurred.
-    values.get(values.len().saturating_sub(1) / 2).copied()
+/// The middle value, or the lower of the two in the middle: always a value that occurred.
+pub(super) fn median(values: &[f64]) -> Option<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len().saturating_sub(1) / 2).copied()
 }
 
 /// A run that counts in a row over the seeds.
@@ -188,13 +189,13 @@ fn seed_row(runs: &[SeedRun], (scene, controller, mirrored): (&str, &str, bool))
         course: if mirrored { "mirrored" } else { "as it is" }.into(),
         runs: runs.len(),
         safe_fraction: (judged > 0).then(|| f64::from(safe) / f64::from(judged)),
-        ltr_abs_median: median(values(|f| f.ltr_abs_max)),
+        ltr_abs_median: median(&values(|f| f.ltr_abs_max)),
         ltr_abs_worst: values(|f| f.ltr_abs_max).into_iter().reduce(f64::max),
-        speed_mean_median_kmh: median(values(|f| f.speed_mean_kmh)),
+        speed_mean_median_kmh: median(&values(|f| f.speed_mean_kmh)),
         speed_min_worst_kmh: values(|f| f.speed_min_kmh).into_iter().reduce(f64::min),
         path_deviation_worst_m: values(|f| f.path_deviation_max_m)
             .into_iter()
             .reduce(f64::max),
-        cost_median: median(values(|f| f.cost)),
+        cost_median: median(&values(|f| f.cost)),
     }
 }

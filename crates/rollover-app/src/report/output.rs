@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 
 use super::cast::PAPER_SUFFIX;
 use super::data::Report;
 use super::{FIGURE_ENDS, PAPER_FIGURES, TABLE_NAMES, figures, html, tables};
-use crate::output::{create_folder, write_whole};
+use crate::output::{create_folder, remove_old_file, write_whole};
 
 /// The page's usual name.
 pub const REPORT_FILE: &str = "report.html";
@@ -71,9 +71,9 @@ pub fn write(report: &Report, page: &Path) -> Result<Written> {
 /// When a file cannot be removed.
 pub fn remove_old(page: &Path) -> Result<()> {
     let folder = folder_of(page);
-    remove(page)?;
+    remove_old_file(page)?;
     for table in TABLE_NAMES {
-        remove(&folder.join(TABLES).join(format!("{table}.csv")))?;
+        remove_old_file(&folder.join(TABLES).join(format!("{table}.csv")))?;
     }
     let figures = folder.join(FIGURES);
     remove_figures(&figures.join(SCENES), is_of_a_scene)?;
@@ -91,7 +91,7 @@ fn remove_figures(folder: &Path, ours: impl Fn(&str) -> bool) -> Result<()> {
         let name = entry.file_name();
         let name = name.to_str().and_then(|name| name.strip_suffix(".svg"));
         if name.is_some_and(&ours) {
-            remove(&entry.path())?;
+            remove_old_file(&entry.path())?;
         }
     }
     Ok(())
@@ -111,14 +111,5 @@ fn folder_of(page: &Path) -> &Path {
     match page.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
-    }
-}
-
-fn remove(file: &Path) -> Result<()> {
-    match std::fs::remove_file(file) {
-        Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
-            Err(e).with_context(|| format!("cannot replace {}", file.display()))
-        }
-        _ => Ok(()),
     }
 }

@@ -5,6 +5,7 @@ use std::fmt::Write;
 use vehicle_dyn::metrics::Outcome;
 
 use crate::report::campaign::Campaign;
+use crate::report::measures::median;
 use crate::summary::Summary;
 
 /// One run that was to be made: its numbers, or nothing if there was no controller.
@@ -161,11 +162,4 @@ pub(super) fn rolled_over(run: &Summary) -> bool {
 
 pub(super) fn rolled_over_in_the_last_turn(run: &Summary) -> bool {
     rolled_over(run) && run.course.turns > 0 && run.course.end_turn == run.course.turns
-}
-
-/// The middle value, or the lower of the two in the middle.
-pub(super) fn median(values: &[f64]) -> Option<f64> {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len().saturating_sub(1) / 2).copied()
 }

@@ -10,9 +10,10 @@ mod reasons;
 
 use super::campaign::Campaign;
 use super::data::{Claim, Settings, Verdict};
+use super::measures::median;
 use crate::summary::{SPEED_RECOVERED_KMH, Summary};
 use crate::timing::{TimedForm, TimedMethod};
-use cases::{Cases, Count, completed, median, rolled_over, rolled_over_in_the_last_turn, safe};
+use cases::{Cases, Count, completed, rolled_over, rolled_over_in_the_last_turn, safe};
 
 /// The scenarios of the paper.
 pub const SCENARIOS: [&str; 3] = [SEDAN, TRUCK, RIVERBED];
@@ -162,8 +163,8 @@ impl<'a> Judge<'a> {
     }
 
     /// Table I.
-    fn table(&self) -> [Option<Claim>; 3] {
-        [self.same_decisions(), self.faster(), None]
+    fn table(&self) -> [Option<Claim>; 2] {
+        [self.same_decisions(), self.faster()]
     }
 
     fn same_decisions(&self) -> Option<Claim> {

@@ -2,9 +2,10 @@
 
 use sysid::EffectVerdict;
 
-use super::cases::{Cases, completed, median};
+use super::cases::{Cases, completed};
 use crate::report::campaign::Campaign;
 use crate::report::data::{Reason, RunLink, Verdict};
+use crate::report::measures::median;
 use crate::scenario::FLOOR;
 use crate::summary::Summary;
 
