@@ -25,6 +25,7 @@ use rollover_app::terrain;
 use sysid::OffsetChoice;
 use sysid::lmpc::OffsetHandling;
 use vehicle_dyn::metrics::Outcome;
+use vehicle_dyn::simulation::ReadyVehicle;
 
 const SEEDS: std::ops::Range<u64> = 10..20;
 /// Steering-wheel weight of 1/rad², per deg².
@@ -209,7 +210,7 @@ fn drive(variant: &Variant, seed: u64, usual: &Recorded<'_>) -> Result<Option<Su
     let recipe = format!("{:?}", scenario.recording);
     let mut settings = scenario.controllers[variant.of].clone();
     (variant.change)(&mut scenario, &mut settings);
-    let vehicle = vehicle_dyn::vehicles::find(&scenario.vehicle)?;
+    let vehicle = ReadyVehicle::new(vehicle_dyn::vehicles::find(&scenario.vehicle)?)?;
     let interrupt = Interrupt::default();
     let own = if format!("{:?}", scenario.recording) == recipe {
         None
@@ -296,7 +297,7 @@ fn main() -> Result<()> {
         .flat_map(|v| seeds.iter().map(move |&seed| (v, seed)))
         .collect();
     let scenario = load("sedan-s1")?;
-    let vehicle = vehicle_dyn::vehicles::find(&scenario.vehicle)?;
+    let vehicle = ReadyVehicle::new(vehicle_dyn::vehicles::find(&scenario.vehicle)?)?;
     let data = seeds
         .iter()
         .map(|&seed| Ok(record(&scenario, &vehicle, seed, &Interrupt::default())?.0))

@@ -13,8 +13,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 use serde::Serialize;
 use vehicle_dyn::metrics::Outcome;
-use vehicle_dyn::parameters::VehicleParameters;
 use vehicle_dyn::sensors::derived_seed;
+use vehicle_dyn::simulation::ReadyVehicle;
 
 use crate::closed_loop::{DrivenVehicle, INPUTS, OUTPUTS};
 use crate::interrupt::Interrupt;
@@ -73,7 +73,7 @@ pub struct RecordSummary {
 /// When the vehicle cannot be simulated or does not stay on its wheels and on the road.
 pub fn record(
     scenario: &Scenario,
-    vehicle: &VehicleParameters,
+    vehicle: &ReadyVehicle,
     seed: u64,
     interrupt: &Interrupt,
 ) -> Result<(Dataset, RecordingSummary)> {
@@ -88,7 +88,7 @@ pub fn record(
     let largest = |of: fn(&RecordSummary) -> f64| records.iter().map(of).fold(0.0, f64::max);
     let summary = RecordingSummary {
         scenario: scenario.name.clone(),
-        vehicle: vehicle.name.clone(),
+        vehicle: vehicle.parameters().name.clone(),
         seed,
         samples: dataset.samples(),
         ltr_filled_samples: records.iter().map(|r| r.ltr_filled_samples).sum(),
@@ -117,7 +117,7 @@ pub fn record_seed(seed: u64, number: usize) -> u64 {
 /// Drives the record of a recipe, number (from 1) and seed: inputs, outputs and what it came to.
 fn drive(
     scenario: &Scenario,
-    vehicle: &VehicleParameters,
+    vehicle: &ReadyVehicle,
     (recipe, number, seed): (&RecordRecipe<'_>, usize, u64),
     interrupt: &Interrupt,
 ) -> Result<(Mat<f64>, Mat<f64>, RecordSummary)> {

@@ -5,13 +5,14 @@ use rollover_app::interrupt::Interrupt;
 use rollover_app::record::{record, record_seed};
 use rollover_app::scenario::{FurtherRecord, Scenario, load};
 use vehicle_dyn::metrics::Outcome;
-use vehicle_dyn::parameters::VehicleParameters;
 use vehicle_dyn::road::Course;
+use vehicle_dyn::simulation::ReadyVehicle;
 use vehicle_dyn::terrain::Terrain;
 
-fn scenario() -> (Scenario, VehicleParameters) {
+fn scenario() -> (Scenario, ReadyVehicle) {
     let scenario = load("riverbed-s3").expect("the built-in scenario is valid");
     let vehicle = vehicle_dyn::vehicles::find(&scenario.vehicle).expect("its vehicle is built in");
+    let vehicle = ReadyVehicle::new(vehicle).expect("its parameters are allowed");
     (scenario, vehicle)
 }
 

@@ -8,16 +8,17 @@ use rollover_app::record::record;
 use rollover_app::run_log::LogRow;
 use rollover_app::scenario::{DRIVER, Scenario, load};
 use vehicle_dyn::metrics::Outcome;
-use vehicle_dyn::parameters::VehicleParameters;
 use vehicle_dyn::road::{Course, Segment};
+use vehicle_dyn::simulation::ReadyVehicle;
 use vehicle_dyn::terrain::Terrain;
 
 /// Recording seeds that were not used to choose the settings (docs/decisions/0005-sedan-s1.md).
 const JUDGED_SEEDS: std::ops::Range<u64> = 10..20;
 
-fn scenario() -> (Scenario, VehicleParameters) {
+fn scenario() -> (Scenario, ReadyVehicle) {
     let scenario = load("sedan-s1").expect("the built-in scenario is valid");
     let vehicle = vehicle_dyn::vehicles::find(&scenario.vehicle).expect("its vehicle is built in");
+    let vehicle = ReadyVehicle::new(vehicle).expect("its parameters are allowed");
     (scenario, vehicle)
 }
 

@@ -9,7 +9,7 @@ use rollover_app::record::{RecordingSummary, record};
 use rollover_app::run_log::{self, LogRow};
 use rollover_app::scenario::{DRIVER, Scenario, load};
 use rollover_app::summary::{RunIdentity, Summary};
-use vehicle_dyn::parameters::VehicleParameters;
+use vehicle_dyn::simulation::ReadyVehicle;
 use vehicle_dyn::terrain::Terrain;
 
 const SCENARIO: &str = include_str!("../../../scenarios/sedan-s1.toml");
@@ -28,8 +28,9 @@ fn anyhow_of(error: impl std::error::Error + Send + Sync + 'static) -> anyhow::E
     error.into()
 }
 
-fn vehicle(scenario: &Scenario) -> VehicleParameters {
-    vehicle_dyn::vehicles::find(&scenario.vehicle).expect("its vehicle is built in")
+fn vehicle(scenario: &Scenario) -> ReadyVehicle {
+    let vehicle = vehicle_dyn::vehicles::find(&scenario.vehicle).expect("its vehicle is built in");
+    ReadyVehicle::new(vehicle).expect("its parameters are allowed")
 }
 
 /// The controller from the recording of a seed, and what the recording came to.

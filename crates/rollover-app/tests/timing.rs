@@ -12,6 +12,7 @@ use rollover_app::terrain;
 use rollover_app::timing::{
     Follow, LoggedRun, TimedForm, TimedMethod, Timing, TimingTable, deepc_equals_rd_deepc, measure,
 };
+use vehicle_dyn::simulation::ReadyVehicle;
 
 const SCENARIO: &str = include_str!("../../../scenarios/sedan-s1.toml");
 const SEED: u64 = 10;
@@ -35,6 +36,7 @@ fn drive(scenario: &Scenario, recorded: &Recorded<'_>, name: &str, folder: &Path
         progress: &|_| {},
     };
     let vehicle = vehicle_dyn::vehicles::embedded(&scenario.vehicle).expect("it is built in");
+    let vehicle = ReadyVehicle::new(vehicle).expect("its parameters are allowed");
     let settings = scenario.controller(name).expect("it is there");
     let built = closed_loop::controller(
         scenario,
@@ -55,6 +57,7 @@ fn drive(scenario: &Scenario, recorded: &Recorded<'_>, name: &str, folder: &Path
 
 fn recording(scenario: &Scenario) -> Dataset {
     let vehicle = vehicle_dyn::vehicles::embedded(&scenario.vehicle).expect("it is built in");
+    let vehicle = ReadyVehicle::new(vehicle).expect("its parameters are allowed");
     let recorded = record(scenario, &vehicle, SEED, &Interrupt::default());
     recorded.expect("it records").0
 }

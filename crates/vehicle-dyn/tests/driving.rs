@@ -4,7 +4,7 @@ mod common;
 
 use common::{TICK_S, on_flat, sedan, step_steer};
 use nalgebra::Vector3;
-use vehicle_dyn::simulation::{Command, InitialPose, Simulation};
+use vehicle_dyn::simulation::{Command, InitialPose, ReadyVehicle, Simulation, SimulationError};
 use vehicle_dyn::terrain::{Ground, Terrain};
 use vehicle_dyn::units::DEGREE;
 
@@ -29,6 +29,33 @@ fn the_speed_controller_reaches_and_holds_the_target() {
             later.speed_kmh()
         );
     }
+}
+
+#[test]
+fn a_ready_vehicle_starts_as_a_new_one_does() {
+    let ready = ReadyVehicle::new(sedan()).expect("allowed");
+    for (speed_kmh, yaw_rad) in [(105.0, 0.3), (60.0, -1.0), (105.0, 0.7)] {
+        let pose = InitialPose {
+            x_m: 2.0,
+            y_m: -1.0,
+            yaw_rad,
+            speed_m_s: speed_kmh / 3.6,
+        };
+        let again = ready
+            .simulation(Terrain::flat(0.85), pose)
+            .expect("allowed");
+        let new = Simulation::new(&sedan(), Terrain::flat(0.85), pose).expect("allowed");
+        assert_eq!(again.state(), new.state());
+        assert_eq!(again.observation(), new.observation());
+    }
+    let too_fast = InitialPose {
+        x_m: 0.0,
+        y_m: 0.0,
+        yaw_rad: 0.0,
+        speed_m_s: 200.0,
+    };
+    let refused = ready.simulation(Terrain::flat(0.85), too_fast);
+    assert!(matches!(refused, Err(SimulationError::Initial { .. })));
 }
 
 #[test]

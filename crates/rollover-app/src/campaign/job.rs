@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use indicatif::ProgressBar;
 use sysid::{Identification, Progress};
-use vehicle_dyn::parameters::VehicleParameters;
+use vehicle_dyn::simulation::ReadyVehicle;
 use vehicle_dyn::terrain::Terrain;
 
 use crate::closed_loop::{self, Built, Recorded, Run, SteeringProfile, Watch};
@@ -28,7 +28,7 @@ const IDENTIFICATION_JSON: &str = "identification.json";
 /// One run to be made.
 pub(crate) struct Job<'a> {
     pub(crate) scenario: &'a Scenario,
-    pub(crate) vehicle: &'a VehicleParameters,
+    pub(crate) vehicle: &'a ReadyVehicle,
     pub(crate) terrain: Terrain,
     pub(crate) controller: &'a str,
     pub(crate) seed: u64,
@@ -113,7 +113,7 @@ impl Job<'_> {
         let summary = Summary::of_log(
             RunIdentity {
                 scenario: self.scenario.name.clone(),
-                vehicle: self.vehicle.name.clone(),
+                vehicle: self.vehicle.parameters().name.clone(),
                 controller: self.controller.to_owned(),
                 seed: self.seed,
                 mirrored: self.mirrored,
@@ -147,7 +147,7 @@ impl Job<'_> {
         }
         let mut described = SceneFile::new(
             self.scenario,
-            self.vehicle,
+            self.vehicle.parameters(),
             self.controller,
             self.seed,
             Some(&self.terrain),

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, ensure};
 use deepc_core::data::Dataset;
-use vehicle_dyn::parameters::VehicleParameters;
+use vehicle_dyn::simulation::ReadyVehicle;
 
 use crate::cli::{RecordArgs, RunArgs};
 use crate::closed_loop::Recorded;
@@ -17,6 +17,7 @@ use crate::report::{self, REPORT_FILE};
 use crate::scenario::{self, Scenario};
 use crate::summary::Summary;
 use crate::terrain;
+use crate::vehicles_command;
 use job::{Job, step_bar};
 
 /// Name of the first record's file.
@@ -147,7 +148,7 @@ fn print_models(summaries: &[Summary]) -> Result<()> {
 /// Records, and keeps the recording beside the results made from it.
 pub(crate) fn recording(
     scenario: &Scenario,
-    vehicle: &VehicleParameters,
+    vehicle: &ReadyVehicle,
     seed: u64,
     out: &Path,
     interrupt: &Interrupt,
@@ -162,17 +163,17 @@ pub(crate) fn recording(
 fn scenario_with_vehicle(
     scenario: &str,
     instead: Option<&str>,
-) -> Result<(Scenario, VehicleParameters)> {
+) -> Result<(Scenario, ReadyVehicle)> {
     let mut scenario = scenario::load(scenario)?;
     let vehicle = load_vehicle(instead.unwrap_or(&scenario.vehicle))?;
     if instead.is_some() {
-        scenario.swap_vehicle(&vehicle);
+        scenario.swap_vehicle(vehicle.parameters());
     }
     Ok((scenario, vehicle))
 }
 
-pub(crate) fn load_vehicle(name_or_path: &str) -> Result<VehicleParameters> {
-    crate::vehicles_command::load(name_or_path)
+pub(crate) fn load_vehicle(name_or_path: &str) -> Result<ReadyVehicle> {
+    Ok(ReadyVehicle::new(vehicles_command::load(name_or_path)?)?)
 }
 
 pub(crate) fn default_folder(scenario: &Scenario) -> PathBuf {

@@ -11,7 +11,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail};
 use deepc_core::controller::{Controller, Origin, Plant, Reference};
 use vehicle_dyn::metrics::{Outcome, two_wheel_clearance_m};
-use vehicle_dyn::parameters::VehicleParameters;
+use vehicle_dyn::simulation::ReadyVehicle;
 use vehicle_dyn::terrain::Terrain;
 
 pub(crate) use build::deepc_problem;
@@ -29,7 +29,7 @@ pub struct Run<'a> {
     /// The scenario.
     pub scenario: &'a Scenario,
     /// Its vehicle.
-    pub vehicle: &'a VehicleParameters,
+    pub vehicle: &'a ReadyVehicle,
     /// The ground under its course.
     pub terrain: Terrain,
     /// Speed at the start and reference afterwards, km/h.
@@ -47,11 +47,7 @@ pub struct Run<'a> {
 impl<'a> Run<'a> {
     /// The driver alone at the scenario's speed, with seed 0.
     #[must_use]
-    pub fn of_driver(
-        scenario: &'a Scenario,
-        vehicle: &'a VehicleParameters,
-        terrain: Terrain,
-    ) -> Self {
+    pub fn of_driver(scenario: &'a Scenario, vehicle: &'a ReadyVehicle, terrain: Terrain) -> Self {
         Self {
             scenario,
             vehicle,

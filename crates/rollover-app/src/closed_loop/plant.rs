@@ -7,10 +7,9 @@ use anyhow::Result;
 use deepc_core::controller::{Plant, PlantError};
 use vehicle_dyn::driver::Driver;
 use vehicle_dyn::metrics::{LoadTransferIndex, Outcome, OutcomeMonitor};
-use vehicle_dyn::parameters::VehicleParameters;
 use vehicle_dyn::road::{Course, CourseDescription, Location};
 use vehicle_dyn::sensors::{Channel, Sensors, derived_seed};
-use vehicle_dyn::simulation::{Command, InitialPose, Observation, Simulation};
+use vehicle_dyn::simulation::{Command, InitialPose, Observation, ReadyVehicle, Simulation};
 use vehicle_dyn::terrain::Terrain;
 
 use crate::scenario::{DRIVER_CHANNELS, Scenario};
@@ -46,7 +45,7 @@ impl DrivenVehicle {
     /// course.
     pub fn new(
         scenario: &Scenario,
-        vehicle: &VehicleParameters,
+        vehicle: &ReadyVehicle,
         course: &CourseDescription,
         terrain: Terrain,
         speed_kmh: f64,
@@ -61,7 +60,8 @@ impl DrivenVehicle {
             yaw_rad: start.heading_rad,
             speed_m_s: speed_kmh / 3.6,
         };
-        let simulation = Simulation::new(vehicle, terrain, pose)?;
+        let simulation = vehicle.simulation(terrain, pose)?;
+        let vehicle = vehicle.parameters();
         let seen = simulation.observation();
         let mut sensors = Sensors::new(
             &scenario.sensors,

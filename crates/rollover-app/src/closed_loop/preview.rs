@@ -3,7 +3,7 @@
 use anyhow::Result;
 use deepc_core::controller::{Plant, Reference};
 use faer::Mat;
-use vehicle_dyn::parameters::VehicleParameters;
+use vehicle_dyn::simulation::ReadyVehicle;
 use vehicle_dyn::terrain::Terrain;
 
 use super::{DrivenVehicle, INPUTS, OUTPUTS};
@@ -25,7 +25,7 @@ impl SteeringProfile {
     /// When the vehicle cannot be simulated.
     pub fn record(
         scenario: &Scenario,
-        vehicle: &VehicleParameters,
+        vehicle: &ReadyVehicle,
         terrain: &Terrain,
         seed: u64,
     ) -> Result<Self> {

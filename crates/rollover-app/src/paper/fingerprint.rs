@@ -26,7 +26,8 @@ impl Program {
 
     /// The fingerprint of a run: the program, and everything that the run depends on.
     pub(super) fn of_run(self, plan: &Plan, run: &PlannedRun) -> String {
-        let (scenario, vehicle) = (&plan.driven(run).scenario, &plan.scenes[run.scene].vehicle);
+        let scenario = &plan.driven(run).scenario;
+        let vehicle = plan.scenes[run.scene].vehicle.parameters();
         let mut hasher = DefaultHasher::new();
         self.0.hash(&mut hasher);
         // The parts of a scenario that other controllers share, then the one that drives.

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, ensure};
-use vehicle_dyn::parameters::VehicleParameters;
+use vehicle_dyn::simulation::ReadyVehicle;
 use vehicle_dyn::terrain::Terrain;
 
 use crate::campaign::load_vehicle;
@@ -38,7 +38,7 @@ pub(super) struct Plan {
 
 /// A scenario on its course and on the mirror image, with the ground under both.
 pub(super) struct Scene {
-    pub(super) vehicle: VehicleParameters,
+    pub(super) vehicle: ReadyVehicle,
     pub(super) as_it_is: Driven,
     pub(super) mirrored: Driven,
 }

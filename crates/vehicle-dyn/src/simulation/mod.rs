@@ -7,11 +7,13 @@ mod diagnostics;
 mod dynamics;
 mod observation;
 mod observe;
+mod ready;
 mod settle;
 mod state;
 
 pub use diagnostics::{Energy, Momentum};
 pub use observation::Observation;
+pub use ready::ReadyVehicle;
 pub use state::State;
 
 use nalgebra::Vector3;
@@ -138,6 +140,7 @@ impl Simulation {
     ///
     /// The equilibrium is found on level ground of friction 1 and then laid onto the ground under
     /// the vehicle, so on rough or banked ground the first moments still hold a small transient.
+    /// For many simulations of one vehicle [`ReadyVehicle`] finds it once.
     ///
     /// # Errors
     /// [`SimulationError`] when parameters or pose are out of range.
@@ -169,20 +172,30 @@ impl Simulation {
         }
         check_pose(&initial)?;
         let dynamics = Dynamics::new(vehicle);
-        let state = settle::rolling_state(&dynamics, initial.speed_m_s, substep_s);
-        let mut simulation = Self {
+        let rolling = settle::rolling_state(&dynamics, initial.speed_m_s, substep_s);
+        Self::placed(dynamics, &rolling, terrain, &initial, substep_s)
+    }
+
+    /// The vehicle in its equilibrium, put on the ground.
+    fn placed(
+        dynamics: Dynamics,
+        rolling: &State,
+        terrain: Terrain,
+        initial: &InitialPose,
+        substep_s: f64,
+    ) -> Result<Self, SimulationError> {
+        let state = settle::placed(rolling, &terrain, initial);
+        if !state.is_finite() {
+            return Err(SimulationError::Diverged { time_s: 0.0 });
+        }
+        Ok(Self {
             dynamics,
             terrain,
             substep_s,
             state,
             substeps_done: 0,
             yaw_rad: initial.yaw_rad,
-        };
-        simulation.state = settle::placed(&state, &simulation.terrain, &initial);
-        if !simulation.state.is_finite() {
-            return Err(SimulationError::Diverged { time_s: 0.0 });
-        }
-        Ok(simulation)
+        })
     }
 
     /// Advances by `tick_s` (10 ms in the paper) with the command held, and observes.
