@@ -1,76 +1,51 @@
 //! Least squares over any number of rows in the memory of a triangle.
 
-use deepc_core::faer::dyn_stack::{MemBuffer, MemStack};
-use deepc_core::faer::linalg::qr::no_pivoting::factor::{
-    qr_in_place, qr_in_place_scratch, recommended_block_size,
-};
-use deepc_core::faer::{Mat, MatMut, MatRef, Par, Spec};
+use deepc_core::faer::{Mat, MatMut, MatRef};
 
 use crate::error::SysidError;
+use crate::kernels::Block;
 
 /// The triangular factor of a matrix whose rows come a block at a time: Householder QR of the
 /// triangle so far over the block, as accurate as that of all rows at once.
 pub(crate) struct StreamedQr {
-    /// The triangle (first `occupied` rows), then what waits.
-    stack: Mat<f64>,
+    columns: usize,
+    /// R, row by row; rows from `occupied` on are zero.
+    triangle: Vec<f64>,
     occupied: usize,
-    filled: usize,
-    coefficients: Mat<f64>,
-    memory: MemBuffer,
+    waiting: Block,
 }
 
 impl StreamedQr {
     /// For rows of `columns` numbers; `block` rows are taken at once.
     pub fn new(columns: usize, block: usize) -> Self {
-        let rows = columns + block.max(columns).max(1);
-        let size = recommended_block_size::<f64>(rows, columns).max(1);
-        let scratch = qr_in_place_scratch::<f64>(rows, columns, size, Par::Seq, Spec::default());
         Self {
-            stack: Mat::zeros(rows, columns),
+            columns,
+            triangle: vec![0.0; columns * columns],
             occupied: 0,
-            filled: 0,
-            coefficients: Mat::zeros(size, columns),
-            memory: MemBuffer::new(scratch),
+            waiting: Block::new(columns, block),
         }
     }
 
     /// Room for the next `count` rows (at most the block), to be overwritten whole.
     pub fn rows(&mut self, count: usize) -> MatMut<'_, f64> {
-        if self.filled + count > self.stack.nrows() {
+        if !self.waiting.has_room(count) {
             self.compress();
         }
-        let first = self.filled;
-        self.filled += count;
-        self.stack.subrows_mut(first, count)
+        self.waiting.append(count)
     }
 
     fn compress(&mut self) {
-        let kept = self.filled.min(self.stack.ncols());
-        if self.filled == self.occupied || kept == 0 {
-            return;
-        }
-        qr_in_place(
-            self.stack.subrows_mut(0, self.filled),
-            self.coefficients.subcols_mut(0, kept),
-            Par::Seq,
-            MemStack::new(&mut self.memory),
-            Spec::default(),
-        );
-        for j in 0..self.stack.ncols() {
-            // Below the diagonal are the reflectors.
-            let column = &mut self.stack.col_as_slice_mut(j)[..kept];
-            if j + 1 < kept {
-                column[j + 1..].fill(0.0);
-            }
-        }
-        self.occupied = kept;
-        self.filled = kept;
+        self.occupied = (self.occupied + self.waiting.rows()).min(self.columns);
+        self.waiting.fold_into(&mut self.triangle);
+        // What fewer rows than columns leave there is rounding.
+        self.triangle[self.occupied * self.columns..].fill(0.0);
     }
 
     /// R, upper triangular (trapezoidal if there were fewer rows than columns).
     pub fn triangle(&mut self) -> MatRef<'_, f64> {
         self.compress();
-        self.stack.subrows(0, self.occupied)
+        let all = MatRef::from_row_major_slice(&self.triangle, self.columns, self.columns);
+        all.subrows(0, self.occupied)
     }
 }
 
@@ -163,6 +138,8 @@ pub(crate) fn thin_svd(m: MatRef<'_, f64>, what: &'static str) -> Result<ThinSvd
 
 #[cfg(test)]
 mod tests {
+    use deepc_core::faer::Scale;
+
     use super::*;
 
     fn wave(rows: usize, columns: usize) -> Mat<f64> {
@@ -187,6 +164,39 @@ mod tests {
             let error = (r.transpose() * r - m.transpose() * &m).norm_max();
             assert!(error < 1e-12, "{rows} rows: {error:e}");
             assert!((0..r.nrows()).all(|i| (0..i).all(|j| r[(i, j)] == 0.0)));
+        }
+    }
+
+    #[test]
+    fn the_triangle_is_that_of_another_library_whatever_the_scale() {
+        for (columns, scale) in [(1, 1.0), (5, 1.0), (13, 1e-170), (22, 1e200), (40, 1.0)] {
+            let m = wave(150, columns) * Scale(scale);
+            let mut qr = StreamedQr::new(columns, 64);
+            for first in (0..150).step_by(50) {
+                qr.rows(50).copy_from(m.subrows(first, 50));
+            }
+            let r = qr.triangle();
+            let expected = m.qr();
+            let expected = expected.thin_R();
+            // Rows are known up to their signs.
+            for i in 0..columns {
+                let sign = (r[(i, i)] * expected[(i, i)]).signum();
+                for j in i..columns {
+                    let error = (r[(i, j)] - sign * expected[(i, j)]).abs() / scale;
+                    assert!(error < 1e-11, "{columns} columns, ({i}, {j}): {error:e}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_number_stays_visible() {
+        for (rows, value) in [(17..18, f64::NAN), (0..30, f64::NAN), (3..4, f64::INFINITY)] {
+            let mut m = wave(30, 3);
+            rows.for_each(|i| m[(i, 1)] = value);
+            let mut qr = StreamedQr::new(3, 64);
+            qr.rows(30).copy_from(&m);
+            assert!(!qr.triangle().is_all_finite());
         }
     }
 

@@ -8,11 +8,13 @@
 )]
 
 mod free;
+mod householder;
 
 use deepc_core::faer::Mat;
 use pulp::{Arch, NullaryFnOnce};
 
 pub(crate) use free::{add_free, free_rows};
+pub(crate) use householder::Block;
 
 use crate::state_space::SystemMatrices;
 
