@@ -5,20 +5,26 @@ const VERDICTS = {
   partly: ["fair", "~"],
   "not reproduced": ["bad", "✕"],
 };
+// Instead of a verdict, where no run could show it.
+const NOTHING = "nothing to judge";
 // How the settings are called; claims that depend on none of them have null.
 const SETTINGS = [
   ["recommended", "Recommended settings"],
   ["paper", "The paper's settings"],
 ];
 
-function verdictBadge(claim, words = claim.verdict) {
-  const [kind, sign] = VERDICTS[claim.verdict] ?? ["unknown", "?"];
+function verdictOf(claim) {
+  return claim.judged || known(claim.fraction) ? claim.verdict : NOTHING;
+}
+
+function verdictBadge(verdict, words = verdict) {
+  const [kind, sign] = VERDICTS[verdict] ?? ["unknown", verdict === NOTHING ? "–" : "?"];
   return badge(kind, sign, words);
 }
 
 // In how many of the judged runs a claim holds.
 function holdsIn(claim) {
-  if (!claim.judged) return known(claim.fraction) ? percent(claim.fraction) : "none to judge";
+  if (!claim.judged) return known(claim.fraction) ? percent(claim.fraction) : "";
   return `${Math.round((claim.fraction ?? 0) * claim.judged)} of ${claim.judged}`;
 }
 
@@ -52,10 +58,10 @@ function claimRow(row) {
     const claim = row[key];
     // Where there are no columns, words say whose settings they are.
     return el("span", { class: "verdict" }, el("span", { class: "verdict-of" }, `${words}: `),
-      claim ? [verdictBadge(claim), " ", el("span", { class: "holds" }, holdsIn(claim))] : NONE);
+      claim ? [verdictBadge(verdictOf(claim)), " ", el("span", { class: "holds" }, holdsIn(claim))] : NONE);
   };
   const verdicts = row.both
-    ? el("span", { class: "verdict verdict-both" }, verdictBadge(row.both), " ", el("span", { class: "holds" }, holdsIn(row.both)))
+    ? el("span", { class: "verdict verdict-both" }, verdictBadge(verdictOf(row.both)), " ", el("span", { class: "holds" }, holdsIn(row.both)))
     : SETTINGS.map(([key, words]) => cell(key, words));
   const details = row.both ? claimDetails(row.both)
     : SETTINGS.filter(([key]) => row[key]).map(([key, words]) => claimDetails(row[key], words));
@@ -69,9 +75,9 @@ function claimRow(row) {
 function claimCounts() {
   const line = (key, words) => {
     const claims = report.claims.filter((claim) => (claim.settings ?? null) === key);
-    const counts = Object.keys(VERDICTS).map((verdict) => [verdict, claims.filter((claim) => claim.verdict === verdict).length]);
+    const counts = [...Object.keys(VERDICTS), NOTHING].map((verdict) => [verdict, claims.filter((claim) => verdictOf(claim) === verdict).length]);
     return claims.length ? [el("dt", {}, words), el("dd", {}, counts.filter(([, n]) => n > 0).map(([verdict, n]) =>
-      [verdictBadge({ verdict }, `${n} ${verdict}`), " "]))] : null;
+      [verdictBadge(verdict, `${n} ${verdict}`), " "]))] : null;
   };
   const neither = report.claims.some((claim) => claim.settings) ? "Independent of settings" : "Claims";
   return el("dl", { class: "claim-counts" }, SETTINGS.map(([key, words]) => line(key, words)), line(null, neither));

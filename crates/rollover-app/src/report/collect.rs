@@ -1,5 +1,6 @@
 //! A report from logs alone.
 
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
@@ -103,13 +104,21 @@ pub fn collect(paths: &[PathBuf], renamed: &Renamed) -> Report {
 
 /// What a campaign adds to the logs of its runs.
 fn add_campaign(report: &mut Report, campaign: &Campaign) {
-    report.title = "Rollover prevention from data: the paper, reproduced".into();
+    report.title = "Rollover prevention from data: the paper's claims, checked".into();
     report.asked = claims::QUESTION.map(str::to_owned).to_vec();
     report.claims = claims::judge(campaign);
     report.timing = campaign.timing_rows();
     report.seeds = campaign.seed_rows(&report.scenes);
     report.unlogged = campaign.unlogged(&report.scenes);
     report.notes.insert(0, claims::RULE.into());
+    for scene in &mut report.scenes {
+        if let Some(seed) = scene.runs.iter().find_map(|run| run.seed) {
+            let _ = write!(
+                scene.description,
+                " Drawn and replayed is one run of each controller: recording seed {seed}, the course as it is. What the other seeds give is in the table of outcomes."
+            );
+        }
+    }
     if let Some(table) = &campaign.timing {
         report
             .notes

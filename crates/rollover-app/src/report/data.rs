@@ -170,6 +170,8 @@ pub struct SeedRow {
     /// Runs counted.
     pub runs: usize,
     /// Fraction of the runs with a known outcome that were completed, 0 to 1.
+    pub completed_fraction: Option<f64>,
+    /// Fraction of them that were completed with |LTR| never above 1, 0 to 1.
     pub safe_fraction: Option<f64>,
     /// Median of the largest |LTR|.
     pub ltr_abs_median: Option<f64>,

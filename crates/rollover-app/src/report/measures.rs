@@ -179,16 +179,20 @@ fn seed_row(runs: &[SeedRun], (scene, controller, mirrored): (&str, &str, bool))
     let values = |f: fn(&RunFigures) -> Option<f64>| -> Vec<f64> {
         runs.iter().filter_map(|run| f(&run.figures)).collect()
     };
-    let judged = runs.iter().filter_map(|run| run.completed);
-    let (judged, safe) = judged.fold((0, 0), |(all, safe), completed| {
-        (all + 1, safe + i32::from(completed))
-    });
+    let judged = runs.iter().filter(|run| run.completed.is_some()).count();
+    let fraction = |holds: &dyn Fn(&SeedRun) -> bool| {
+        let number = runs.iter().filter(|run| holds(run)).count();
+        (judged > 0).then(|| number as f64 / judged as f64)
+    };
+    let completed = |run: &SeedRun| run.completed == Some(true);
+    let below = |run: &SeedRun| run.figures.ltr_abs_max.is_some_and(|l| l <= LTR_LIFT_OFF);
     SeedRow {
         scene: scene.to_owned(),
         controller: controller.to_owned(),
         course: if mirrored { "mirrored" } else { "as it is" }.into(),
         runs: runs.len(),
-        safe_fraction: (judged > 0).then(|| f64::from(safe) / f64::from(judged)),
+        completed_fraction: fraction(&completed),
+        safe_fraction: fraction(&|run| completed(run) && below(run)),
         ltr_abs_median: median(&values(|f| f.ltr_abs_max)),
         ltr_abs_worst: values(|f| f.ltr_abs_max).into_iter().reduce(f64::max),
         speed_mean_median_kmh: median(&values(|f| f.speed_mean_kmh)),

@@ -94,7 +94,7 @@ pub(super) const PLOTS: [Plot; 9] = [
             "Load transfer ratio",
             "LTR",
             "ltr",
-            "Left turns positive. At ±1 the inner wheels carry nothing. A cross marks a run that ended in a rollover or a spin.",
+            "Left turns positive. At ±1 the wheels of one side carry nothing; beyond, those of the other carry more than the weight, as when the vehicle comes down from two wheels. Dashed: that limit. A cross marks a run that ended in a rollover or a spin.",
         )
     },
     Plot {

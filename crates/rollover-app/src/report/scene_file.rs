@@ -7,7 +7,7 @@ use vehicle_dyn::road::{Course, CourseDescription};
 use vehicle_dyn::terrain::Terrain;
 
 use super::data::{HeightProfile, Limits, Road, Role, Run, Scene, TerrainMap, VehicleShape};
-use crate::scenario::{ControllerSettings, DRIVER, Prediction, Scenario};
+use crate::scenario::{ControllerSettings, DRIVER, FLOOR, Prediction, Scenario};
 use crate::summary::{InputWeights, LTR_LIFT_OFF};
 
 /// Its name.
@@ -62,8 +62,10 @@ impl SceneFile {
         let run = Run {
             controller: controller.to_owned(),
             label: controller.to_owned(),
-            description: settings
-                .map_or_else(|| "The driver alone.".into(), |s| s.description.clone()),
+            description: settings.map_or_else(
+                || of_driver(scenario, controller),
+                |s| s.description.clone(),
+            ),
             role: settings.map_or_else(|| Role::of_name(controller), Role::of_settings),
             seed: (controller != DRIVER).then_some(seed),
             ltr_limit: settings.map(|s| s.ltr_limit),
@@ -75,6 +77,16 @@ impl SceneFile {
             weights: settings.map(|s| s.input_weights),
         })
     }
+}
+
+fn of_driver(scenario: &Scenario, controller: &str) -> String {
+    if controller == FLOOR {
+        let [lowest, _] = scenario.bounds.target_speed_kmh;
+        return format!(
+            "The driver alone, the target speed held at the lowest allowed, {lowest} km/h."
+        );
+    }
+    "The driver alone.".into()
 }
 
 impl Road {

@@ -22,6 +22,10 @@ pub struct CourseMeasures {
     pub violation_first_turn: Option<usize>,
     /// Part of the cost that arose before the last turn; absent as the cost is.
     pub cost_before_last_turn: Option<f64>,
+    /// Mean speed from the beginning of each turn to its end, all turns together, km/h; absent if none
+    /// was reached.
+    #[serde(default)]
+    pub speed_in_turns_mean_kmh: Option<f64>,
     /// Time from the end of the last turn until the speed stays within [`SPEED_RECOVERED_KMH`] of its
     /// reference, s; absent if it does not, or if the last turn was not passed.
     pub speed_recovery_s: Option<f64>,
@@ -45,6 +49,14 @@ impl CourseMeasures {
             rows.iter()
                 .position(|row| row.station_m.is_some_and(|station| station > *end))
         });
+        let in_turns: Vec<f64> = rows
+            .iter()
+            .filter(|row| {
+                let within = |station| turns_m.iter().any(|[a, b]| (*a..=*b).contains(&station));
+                row.station_m.is_some_and(within)
+            })
+            .map(|row| row.speed_kmh)
+            .collect();
         Self {
             turns: turns_m.len(),
             end_turn: rows.last().map_or(0, turn),
@@ -54,6 +66,8 @@ impl CourseMeasures {
                 let rows = rows.iter().filter(before_last);
                 rows.map(|row| weights.stage_cost(row)).sum()
             }),
+            speed_in_turns_mean_kmh: (!in_turns.is_empty())
+                .then(|| in_turns.iter().sum::<f64>() / in_turns.len() as f64),
             speed_recovery_s: passed.and_then(|first| recovery_s(&rows[first..])),
         }
     }

@@ -59,6 +59,9 @@ pub struct Summary {
     /// Stage costs of the inputs summed over the run (paper, Table I; deg² and km²/h²); absent
     /// without weights: the driver alone has none.
     pub cost: Option<f64>,
+    /// The part of it that the target speed has; absent as the cost is.
+    #[serde(default)]
+    pub cost_of_target_speed: Option<f64>,
     /// Control steps taken.
     pub steps: usize,
     /// Steps in which the unconstrained optimum was feasible and no solver ran.
@@ -133,9 +136,14 @@ impl InputWeights {
     #[must_use]
     pub fn stage_cost(&self, row: &LogRow) -> f64 {
         let steering = row.steering_wheel_deg - row.steering_wheel_reference_deg;
+        self.steering_wheel_per_deg2 * steering * steering + self.cost_of_target_speed(row)
+    }
+
+    /// The target speed's part of it.
+    #[must_use]
+    pub fn cost_of_target_speed(&self, row: &LogRow) -> f64 {
         let speed = row.target_speed_kmh - row.target_speed_reference_kmh;
-        self.steering_wheel_per_deg2 * steering * steering
-            + self.target_speed_per_kmh2 * speed * speed
+        self.target_speed_per_kmh2 * speed * speed
     }
 }
 
@@ -180,6 +188,8 @@ impl Summary {
             steering_correction_max_deg: max_of(correction),
             steering_correction_mean_deg: mean_of(correction),
             cost: weights.map(|w| rows.iter().map(|r| w.stage_cost(r)).sum()),
+            cost_of_target_speed: weights
+                .map(|w| rows.iter().map(|r| w.cost_of_target_speed(r)).sum()),
             steps: rows.len(),
             unconstrained_steps: count(|s| s == SolveStatus::Unconstrained),
             solver_steps: count(|s| matches!(s, SolveStatus::Solved | SolveStatus::SolvedBySecond)),

@@ -201,10 +201,12 @@ fn replayed_row(
 ) -> TimingRow {
     let own = !run.log.is_empty();
     let note = if own {
-        format!(
-            "the controller asked again at every step of its run; its decisions differ from the log by at most {:.0e}",
-            replayed.difference
-        )
+        let difference = if replayed.difference > 0.0 {
+            format!("differ from the log by at most {:.0e}", replayed.difference)
+        } else {
+            "are those of the log".into()
+        };
+        format!("the controller asked again at every step of its run; its decisions {difference}")
     } else {
         format!(
             "the controller asked at every step of the run of {along}; it was not driven itself"

@@ -25,13 +25,17 @@ pub(super) const RIVERBED: &str = "riverbed-s3";
 const COSTS_AND_TIMES: &str = "Costs and times";
 
 /// What the campaign asks.
-pub const QUESTION: [&str; 2] = [
+pub const QUESTION: [&str; 3] = [
     "Does a controller that knows the vehicle only from a recorded drive keep it on its wheels where the driver alone rolls over, and does it keep its speed? How does a linear MPC on a model identified from the same recording do?",
-    "Every claim of the paper is judged twice: with the settings that we recommend (chosen on recording seeds 0 to 9) and with the paper's as far as it gives them (`-paper`), on the course and on its mirror image. `floor` is the driver held at the lowest target speed: what a controller must beat in speed.",
+    "The claims are those of \u{201c}Model-free Vehicle Rollover Prevention: A Data-driven Predictive Control Approach\u{201d}. Its vehicles, roads and driver are not published; ours are calibrated so that its situations arise.",
+    "Every claim is judged twice: with the settings that we recommend (a limit on |LTR| with a margin and a larger weight \u{03bb}_g, chosen on recording seeds 0 to 9) and with the paper's as far as it gives them (`-paper`: limit 1, \u{03bb}_g = 100), on the course and on its mirror image. `floor` is the driver held at the lowest target speed: what a controller must beat in speed.",
 ];
 
 /// How a verdict is found.
 pub const RULE: &str = "A claim is `reproduced` where it holds in at least 80 % of the judged runs, `partly` in at least 20 %, else `not reproduced`. Completed means: neither rolled over nor spun out, and never farther from the path than half the road's width. Safe means: completed with |LTR| never above 1.";
+
+/// Said of the driver.
+const ONE_RUN: &str = "; nothing is random about it: a course is driven once, and its mirror image";
 
 /// A speed is near a bound within this distance, km/h.
 const NEAR_KMH: f64 = 2.0;
@@ -44,7 +48,7 @@ const FASTER: f64 = 5.0;
 #[must_use]
 pub fn judge(campaign: &Campaign) -> Vec<Claim> {
     let judge = Judge { campaign };
-    let mut claims = vec![judge.driver()];
+    let mut claims = vec![judge.driver(), judge.driver_before()];
     for settings in [Settings::Recommended, Settings::Paper] {
         claims.extend(judge.sedan(settings));
     }
@@ -154,11 +158,28 @@ impl<'a> Judge<'a> {
             group: group("s1-driver"),
             settings: None,
             claim: "The driver alone rolls over in the last turn.".into(),
-            paper: "rolls over in the last turn, and violates the limit on LTR several times",
+            paper: "rolls over in the last turn",
         };
         let cases = self.cases(SEDAN, "driver");
         let mut claim = self.single(words, &cases, rolled_over_in_the_last_turn)?;
-        claim.ours += "; nothing is random about it, so that a course is driven once";
+        claim.ours += ONE_RUN;
+        Some(claim)
+    }
+
+    fn driver_before(&self) -> Option<Claim> {
+        let words = Words {
+            id: "s1-driver-before".into(),
+            group: group("s1-driver-before"),
+            settings: None,
+            claim: "The driver alone exceeds the limit on LTR before the last turn as well.".into(),
+            paper: "violates the limit on LTR several times",
+        };
+        let cases = self.cases(SEDAN, "driver");
+        let mut claim = self.single(words, &cases, |run| {
+            let turn = run.course.violation_first_turn;
+            turn.is_some_and(|turn| turn < run.course.turns)
+        })?;
+        claim.ours += ONE_RUN;
         Some(claim)
     }
 
@@ -207,12 +228,11 @@ impl<'a> Judge<'a> {
             of: 1,
         };
         let cases = self.cases(SEDAN, "deepc-1");
-        self.claim(
-            words,
-            &cases,
-            count,
-            "The times are in the table of costs and times.",
-        )
+        let ours = format!(
+            "{deepc:.1} s and {rd_deepc:.1} s per step: {:.1} times, beside other runs on the same machine",
+            deepc / rd_deepc
+        );
+        self.claim(words, &cases, count, &ours)
     }
 
     fn sedan(&self, settings: Settings) -> Vec<Option<Claim>> {
@@ -284,7 +304,7 @@ impl<'a> Judge<'a> {
             self.single(
                 words(
                     "s1-lmpc-2-slow",
-                    "LMPC2 gets through near the lower speed limit.",
+                    "LMPC2 gets through near the lower speed limit (mean speed in the turns within 2 km/h of it).",
                     "operates near the lower speed limit in all turns",
                 ),
                 &lmpc_2,
@@ -310,21 +330,21 @@ impl<'a> Judge<'a> {
             self.single(
                 words(
                     "s2-rd-deepc",
-                    "Truck: RD-DeePC is safe.",
+                    "RD-DeePC is safe.",
                     "no rollover and no violation of the limit",
                 ),
                 &rd,
                 safe,
             ),
             self.single(
-                words("s2-lmpc", "Truck: LMPC completes.", "passes all turns"),
+                words("s2-lmpc", "LMPC completes.", "passes all turns"),
                 &lmpc,
                 completed,
             ),
             self.single(
                 words(
                     "s2-lmpc-slow",
-                    "Truck: LMPC gets through near the lowest speed allowed.",
+                    "LMPC gets through near the lowest speed allowed (mean speed in the turns within 2 km/h of it).",
                     "close to the minimum speed",
                 ),
                 &lmpc,
@@ -333,7 +353,7 @@ impl<'a> Judge<'a> {
             self.faster_truck(
                 words(
                     "s2-faster",
-                    "Truck: RD-DeePC is faster than LMPC (both completing).",
+                    "Both complete, and RD-DeePC's mean speed is higher than LMPC's.",
                     "faster than LMPC without compromising safety",
                 ),
                 &rd,
@@ -350,18 +370,14 @@ impl<'a> Judge<'a> {
             self.single(
                 words(
                     "s3-rd-deepc",
-                    "Riverbed: RD-DeePC prevents the rollover.",
+                    "RD-DeePC prevents the rollover.",
                     "avoids rollover on the altered road",
                 ),
                 &rd,
                 completed,
             ),
             self.single(
-                words(
-                    "s3-lmpc",
-                    "Riverbed: LMPC rolls over.",
-                    "unable to prevent rollover",
-                ),
+                words("s3-lmpc", "LMPC rolls over.", "unable to prevent rollover"),
                 &lmpc,
                 rolled_over,
             ),
@@ -439,10 +455,9 @@ impl<'a> Judge<'a> {
     }
 }
 
-/// Completed, and at its slowest near the lowest target speed that was allowed.
+/// Completed, and in the turns near the lowest target speed that was allowed.
 fn slow(run: &Summary) -> bool {
-    completed(run)
-        && run
-            .target_speed_bounds_kmh
-            .is_some_and(|[lowest, _]| run.speed_min_kmh <= lowest + NEAR_KMH)
+    let bounds = run.target_speed_bounds_kmh;
+    let near = bounds.zip(run.course.speed_in_turns_mean_kmh);
+    completed(run) && near.is_some_and(|([lowest, _], mean)| mean <= lowest + NEAR_KMH)
 }
