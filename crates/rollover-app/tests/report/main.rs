@@ -1,6 +1,7 @@
 //! The report: from logs of any origin to a page that opens without a network.
 
 mod browser;
+mod claims;
 mod command;
 mod files;
 mod logs;
