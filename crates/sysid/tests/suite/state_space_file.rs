@@ -1,7 +1,6 @@
 //! Model files and scripts: what is written is read back bit by bit, and nothing else is.
 
-mod common;
-
+use crate::common;
 use common::{Noise, channel, plant};
 use deepc_core::faer::Mat;
 use proptest::prelude::*;

@@ -1,7 +1,6 @@
 //! Prediction of what was held out, and the weights chosen by it.
 
-mod common;
-
+use crate::common;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use common::Lti;

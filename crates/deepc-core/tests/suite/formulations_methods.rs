@@ -1,8 +1,7 @@
 //! Every method against a second implementation, written here from the papers.
 
-mod common;
-mod formulations_support;
-
+use crate::common;
+use crate::formulations_support;
 use common::Solved;
 use deepc_core::program::{
     CondensedProgram, DeepcSettings, ProgramError, Regularisation, Slack, SparseProgram,

@@ -2,8 +2,7 @@
 //!
 //! `FIGURES_DIR=folder cargo test -p sysid --test figures` leaves the figures there to be looked at.
 
-mod common;
-
+use crate::common;
 use common::{Noise, dataset, inputs, plant, plant_with, push, run};
 use deepc_core::faer::{Mat, c64};
 use sysid::figures::{

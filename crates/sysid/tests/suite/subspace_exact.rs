@@ -1,8 +1,7 @@
 //! Several inputs and several outputs: exact without noise, consistent with noise, the same model
 //! in any units, clear errors.
 
-mod subspace_support;
-
+use crate::subspace_support;
 use deepc_core::data::Dataset;
 use deepc_core::faer::Mat;
 use deepc_core::hankel::FactorMethod;

@@ -1,7 +1,6 @@
 //! Measured disturbances in data, Hankel matrices and excitation.
 
-mod common;
-
+use crate::common;
 use common::Lti;
 use deepc_core::data::{CsvLayout, Dataset, OutputTiming};
 use deepc_core::hankel::{Block, ExcitingRole, HankelError, HankelMatrix, Horizons, block_hankel};

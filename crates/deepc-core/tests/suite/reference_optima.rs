@@ -1,7 +1,6 @@
 //! The optima of `tests/reference`, which four other solvers agree on.
 
-mod common;
-
+use crate::common;
 use common::Solved;
 
 use std::path::PathBuf;

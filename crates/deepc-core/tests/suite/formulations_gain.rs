@@ -1,8 +1,6 @@
 //! The optimum without constraints, from one constant matrix.
 
-mod common;
-mod formulations_support;
-
+use crate::formulations_support;
 use deepc_core::program::{CondensedProgram, DeepcSettings, PlanOrigin, Regularisation, Slack};
 use faer::Mat;
 use faer::prelude::SolveLstsq;

@@ -1,7 +1,6 @@
 //! Parity with SLICOT on recordings, and exactness where the truth is known.
 
-mod subspace_support;
-
+use crate::subspace_support;
 use deepc_core::faer::Mat;
 use deepc_core::faer::linalg::solvers::Solve;
 use serde_json::Value;

@@ -1,7 +1,6 @@
 //! Outputs predicted from a past and given inputs.
 
-mod common;
-
+use crate::common;
 use common::Lti;
 use deepc_core::data::Dataset;
 use deepc_core::hankel::{HankelMatrix, Horizons, stack};

@@ -1,8 +1,7 @@
 //! The size of the original study: 2 inputs, 1 output, `T_ini` = N = 100, T = 3200, heavy slack
 //! weights, and a channel at an offset of 100.
 
-mod common;
-
+use crate::common;
 use deepc_core::predictor::Predictor;
 use deepc_core::program::{
     Bounds, CondensedProgram, DeepcSettings, Moment, OutputBounds, PlanOrigin, PredictiveProgram,

@@ -1,7 +1,6 @@
 //! Order, lag and feedback on random systems with several inputs and outputs.
 
-mod common;
-
+use crate::common;
 use common::Lti;
 use deepc_core::assessment::{
     Certainty, DataReport, FindingKind, OrderEstimate, ReportOptions, Severity,

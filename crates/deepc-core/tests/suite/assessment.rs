@@ -1,7 +1,6 @@
 //! The data report: every finding on data that have the fault, none on data that have not.
 
-mod common;
-
+use crate::common;
 use common::Lti;
 use deepc_core::assessment::{
     DataReport, FindingKind, Repetition, ReportOptions, Role, SampleRange, Severity, screen,

@@ -1,8 +1,7 @@
 //! What surrounds an optimum: its parts, its units, its errors.
 
-mod common;
-mod formulations_support;
-
+use crate::common;
+use crate::formulations_support;
 use deepc_core::program::{
     AffineConstraint, Bounds, CondensedProgram, DeepcSettings, DisturbanceSlack, OutputBounds,
     PlanOrigin, PredictiveProgram, ProgramError, Recovered, Regularisation, Slack, Softness,

@@ -1,7 +1,6 @@
 //! Data that come in one sample at a time, against data that were there from the start.
 
-mod common;
-
+use crate::common;
 use common::Lti;
 use deepc_core::data::Dataset;
 use deepc_core::hankel::{HankelMatrix, Horizons, PersistentlyExciting};

@@ -1,7 +1,6 @@
 //! Page matrices, selected columns and scheduled data sets.
 
-mod common;
-
+use crate::common;
 use common::Lti;
 use deepc_core::data::Dataset;
 use deepc_core::hankel::{

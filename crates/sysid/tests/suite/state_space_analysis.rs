@@ -1,7 +1,6 @@
 //! Poles, zeros and responses of the model.
 
-mod common;
-
+use crate::common;
 use std::f64::consts::TAU;
 
 use common::{channel, largest_difference, plant};

@@ -1,7 +1,6 @@
 //! The model as users see it: simulation, prediction, initial states and coordinates.
 
-mod common;
-
+use crate::common;
 use common::{Noise, channel, inputs, largest_difference, plant, plant_with, run};
 use deepc_core::faer::{Mat, mat};
 use sysid::{InitialStateFor, StateSpace, SysidError, SystemMatrices};

@@ -1,7 +1,6 @@
 //! Data without noise, one slack hard and the other soft, over many sizes of the weights.
 
-mod common;
-
+use crate::common;
 use common::Lti;
 use deepc_core::predictor::Predictor;
 use deepc_core::program::{

@@ -1,15 +1,14 @@
 //! Fits and whiteness of models that other tools identified, as another program computed them.
 
-mod common;
-
+use crate::common;
 use common::channel;
 use deepc_core::data::Dataset;
 use deepc_core::faer::Mat;
 use serde_json::Value;
 use sysid::{Channel, StateSpace, SystemMatrices, Validation, ValidationSettings};
 
-const ROWS: &str = include_str!("reference/validation/cd_player_arm_second_half.csv");
-const RESULTS: &str = include_str!("reference/validation/cd_player_arm.json");
+const ROWS: &str = include_str!("../reference/validation/cd_player_arm_second_half.csv");
+const RESULTS: &str = include_str!("../reference/validation/cd_player_arm.json");
 
 fn matrix(value: &Value) -> Mat<f64> {
     let rows = value.as_array().unwrap();

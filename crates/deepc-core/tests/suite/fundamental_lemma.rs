@@ -1,7 +1,6 @@
 //! Willems' fundamental lemma on random systems with several inputs and outputs, both ways.
 
-mod common;
-
+use crate::common;
 use common::Lti;
 use deepc_core::hankel::{ExcitationReport, HankelMatrix, Horizons, block_hankel, stack};
 use faer::prelude::SolveLstsq;

@@ -1,8 +1,7 @@
 //! Validation: fits against a second implementation, tests that keep their size and see what is
 //! missing, and inputs that are refused.
 
-mod common;
-
+use crate::common;
 use common::{Noise, channel, dataset, inputs, plant, plant_with, push, run};
 use deepc_core::data::Dataset;
 use deepc_core::faer::{Mat, mat};

@@ -1,8 +1,7 @@
 //! The projections written out with all columns of the Hankel matrices, against what is computed
 //! from the triangular factor alone.
 
-mod subspace_support;
-
+use crate::subspace_support;
 use deepc_core::faer::linalg::solvers::SolveLstsq;
 use deepc_core::faer::{Mat, MatRef, Side};
 use deepc_core::hankel::{FactorMethod, block_hankel};

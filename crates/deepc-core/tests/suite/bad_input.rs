@@ -1,7 +1,6 @@
 //! What the messages say when the data or settings are wrong.
 
-mod common;
-
+use crate::common;
 use deepc_core::data::{CsvLayout, DataError, Dataset, OutputTiming};
 use deepc_core::hankel::{HankelError, HankelMatrix, Horizons};
 use deepc_core::predictor::Predictor;

@@ -1,7 +1,6 @@
 //! Factors computed without holding the Hankel matrix, against the matrix.
 
-mod common;
-
+use crate::common;
 use common::Lti;
 use deepc_core::data::Dataset;
 use deepc_core::hankel::{

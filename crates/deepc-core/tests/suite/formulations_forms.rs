@@ -1,9 +1,7 @@
 //! Every option, by itself and with all others: the condensed form has the optimum of the sparse
 //! form, which is the problem as the papers write it.
 
-mod common;
-mod formulations_support;
-
+use crate::formulations_support;
 use deepc_core::program::{
     AffineConstraint, Bounds, DeepcSettings, DisturbanceSlack, OutputBounds, Regularisation, Slack,
     Softness, Steps, Terminal,

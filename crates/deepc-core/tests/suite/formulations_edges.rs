@@ -1,7 +1,6 @@
 //! Moments at the edge of what can be planned.
 
-mod common;
-
+use crate::common;
 use common::Lti;
 use deepc_core::predictor::Predictor;
 use deepc_core::program::{
