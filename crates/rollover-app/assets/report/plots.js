@@ -7,7 +7,8 @@ const LIMIT_REACH = 0.6;
 
 const nullGaps = (values) => Array.from(values, (v) => (Number.isNaN(v) ? null : v));
 
-function axes(label) {
+// The last number along x carries the unit.
+function axes(label, unit) {
   const common = {
     stroke: () => ink().soft,
     grid: { stroke: () => ink().line, width: 1 },
@@ -15,7 +16,8 @@ function axes(label) {
     font: "12px system-ui, sans-serif",
   };
   return [
-    { ...common, size: 30, values: (u, ticks) => ticks.map((t) => `${Number(t.toFixed(6))}`) },
+    { ...common, size: 30, values: (u, ticks) => ticks.map((t, index) =>
+      `${Number(t.toFixed(6))}${index === ticks.length - 1 ? ` ${unit}` : ""}`) },
     { ...common, size: AXIS_WIDTH, label, labelSize: 16, labelFont: "12px system-ui, sans-serif", labelGap: 0 },
   ];
 }
@@ -99,7 +101,7 @@ function timePlot(scene, { title, axis, caption, digits, atLeast, limits, name }
     height: PLOT_HEIGHT,
     legend: { show: false },
     scales: { x: { time: false }, y: { range: (u, low, high) => verticalRange(low, high, atLeast, limits) } },
-    axes: axes(axis),
+    axes: axes(axis, "s"),
     // What a click is, and what the end of a drag, is told apart below.
     cursor: { sync: { key: scene.key, setSeries: false }, drag: { x: true, y: false, click: () => {} }, y: false, points: { size: 7 } },
     series: [{}, ...lines.map((line) => ({
@@ -164,7 +166,7 @@ function profilePlot(scene) {
   const series = WHEEL_LOOKS.slice(0, 2).map((look, index) => ({
     label: index ? "right" : "left", stroke: () => colour(look), width: 1.2, points: { show: false } }));
   const u = new uPlot({
-    width: 600, height: PLOT_HEIGHT, legend: { show: false }, axes: axes("mm"),
+    width: 600, height: PLOT_HEIGHT, legend: { show: false }, axes: axes("mm", "m"),
     scales: { x: { time: false } }, cursor: { drag: { x: true, y: false }, y: false }, series: [{}, ...series],
   }, [station_m, mm(left_m), mm(right_m)], holder);
   u.root.setAttribute("role", "img");
