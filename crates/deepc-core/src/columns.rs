@@ -86,6 +86,16 @@ impl Columns {
         });
     }
 
+    /// `out_k = column(picked_k)ᵀ vector`.
+    pub fn products(&self, out: &mut [f64], picked: &[usize], vector: &[f64]) {
+        widely(Products {
+            columns: self,
+            out,
+            picked,
+            vector,
+        });
+    }
+
     /// `out −= Σ factor · column` over the pairs (column, factor).
     pub fn subtract(&self, out: &mut [f64], terms: &[(usize, f64)]) {
         widely(Subtract {
@@ -93,6 +103,24 @@ impl Columns {
             out,
             terms,
         });
+    }
+}
+
+struct Products<'a> {
+    columns: &'a Columns,
+    out: &'a mut [f64],
+    picked: &'a [usize],
+    vector: &'a [f64],
+}
+
+impl NullaryFnOnce for Products<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        for (out, &j) in self.out.iter_mut().zip(self.picked) {
+            *out = dot(self.columns.column(j), self.vector);
+        }
     }
 }
 
@@ -305,6 +333,14 @@ mod tests {
                     let sum: f64 = terms.iter().map(|&(j, f)| f * matrix[(i, j)]).sum();
                     assert!((out - (1.0 - sum)).abs() < 1e-12);
                 }
+            }
+            let mut out = [0.0; 2];
+            columns.products(&mut out, &[4, 2], columns.column(1));
+            for (out, j) in out.iter().zip([4, 2]) {
+                assert_eq!(
+                    out.to_bits(),
+                    dot(columns.column(j), columns.column(1)).to_bits()
+                );
             }
             let (x, y) = (columns.column(1), columns.column(2));
             let plain: f64 = x.iter().zip(y).map(|(x, y)| x * y).sum();

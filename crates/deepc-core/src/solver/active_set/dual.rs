@@ -292,9 +292,9 @@ impl Dual {
             vectors.subtract(&mut self.residual, &self.terms);
             if refinement {
                 let correction = &mut self.correction[..k];
+                vectors.products(correction, &self.factored, &self.residual);
                 for ((value, x), &j) in correction.iter_mut().zip(x.iter()).zip(&self.factored) {
-                    let give = self.rows[j].price.diagonal(self.states[j]);
-                    *value = dot(vectors.column(j), &self.residual) - give * x;
+                    *value -= self.rows[j].price.diagonal(self.states[j]) * x;
                 }
                 self.factor.solve(correction);
                 for (x, correction) in x.iter_mut().zip(correction) {
