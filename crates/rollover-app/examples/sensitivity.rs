@@ -205,17 +205,21 @@ fn shared(of: &'static str) -> Vec<Variant> {
 }
 
 /// Drives a variant. Its recording is the one given unless it changes the recipe.
-fn drive(variant: &Variant, seed: u64, usual: &Recorded<'_>) -> Result<Option<Summary>> {
+fn drive(
+    variant: &Variant,
+    seed: u64,
+    vehicle: &ReadyVehicle,
+    usual: &Recorded<'_>,
+) -> Result<Option<Summary>> {
     let mut scenario = load("sedan-s1")?;
     let recipe = format!("{:?}", scenario.recording);
     let mut settings = scenario.controllers[variant.of].clone();
     (variant.change)(&mut scenario, &mut settings);
-    let vehicle = ReadyVehicle::new(vehicle_dyn::vehicles::find(&scenario.vehicle)?)?;
     let interrupt = Interrupt::default();
     let own = if format!("{:?}", scenario.recording) == recipe {
         None
     } else {
-        match record(&scenario, &vehicle, seed, &interrupt) {
+        match record(&scenario, vehicle, seed, &interrupt) {
             Ok((recording, _)) => Some(recording),
             Err(_) => return Ok(None),
         }
@@ -232,15 +236,15 @@ fn drive(variant: &Variant, seed: u64, usual: &Recorded<'_>) -> Result<Option<Su
     let terrain = terrain::build(&scenario.ground, &scenario.course, &interrupt)?;
     let preview = match settings.reference {
         ReferenceAhead::Held => None,
-        ReferenceAhead::Preview => Some(SteeringProfile::record(
-            &scenario, &vehicle, &terrain, seed,
-        )?),
+        ReferenceAhead::Preview => {
+            Some(SteeringProfile::record(&scenario, vehicle, &terrain, seed)?)
+        }
     };
     let run = Run {
         seed,
         preview,
         controller: Some(built.controller),
-        ..Run::of_driver(&scenario, &vehicle, terrain)
+        ..Run::of_driver(&scenario, vehicle, terrain)
     };
     let finished = closed_loop::run(run, None, &interrupt, || ())?;
     let identity = RunIdentity {
@@ -311,7 +315,7 @@ fn main() -> Result<()> {
             scope.spawn(|| {
                 while let Some(&(v, seed)) = jobs.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let usual = &recorded[usize::try_from(seed - SEEDS.start).unwrap_or(0)];
-                    let made = drive(&variants[v], seed, usual)
+                    let made = drive(&variants[v], seed, &vehicle, usual)
                         .with_context(|| format!("{}: {}", variants[v].of, variants[v].words));
                     let mut found = found.lock().unwrap_or_else(PoisonError::into_inner);
                     found.insert((v, seed), made);

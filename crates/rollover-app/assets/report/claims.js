@@ -1,12 +1,13 @@
 // The paper's claims: a row each, grouped by experiment, the verdicts for both settings side by side.
 
+// Instead of a verdict, where no run could show it.
+const NOTHING = "nothing to judge";
 const VERDICTS = {
   reproduced: ["good", "✓"],
   partly: ["fair", "~"],
   "not reproduced": ["bad", "✕"],
+  [NOTHING]: ["unknown", "–"],
 };
-// Instead of a verdict, where no run could show it.
-const NOTHING = "nothing to judge";
 // How the settings are called; claims that depend on none of them have null.
 const SETTINGS = [
   ["recommended", "Recommended settings"],
@@ -18,7 +19,7 @@ function verdictOf(claim) {
 }
 
 function verdictBadge(verdict, words = verdict) {
-  const [kind, sign] = VERDICTS[verdict] ?? ["unknown", verdict === NOTHING ? "–" : "?"];
+  const [kind, sign] = VERDICTS[verdict] ?? ["unknown", "?"];
   return badge(kind, sign, words);
 }
 
@@ -75,7 +76,7 @@ function claimRow(row) {
 function claimCounts() {
   const line = (key, words) => {
     const claims = report.claims.filter((claim) => (claim.settings ?? null) === key);
-    const counts = [...Object.keys(VERDICTS), NOTHING].map((verdict) => [verdict, claims.filter((claim) => verdictOf(claim) === verdict).length]);
+    const counts = Object.keys(VERDICTS).map((verdict) => [verdict, claims.filter((claim) => verdictOf(claim) === verdict).length]);
     return claims.length ? [el("dt", {}, words), el("dd", {}, counts.filter(([, n]) => n > 0).map(([verdict, n]) =>
       [verdictBadge(verdict, `${n} ${verdict}`), " "]))] : null;
   };

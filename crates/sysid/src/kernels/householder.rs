@@ -88,17 +88,17 @@ impl NullaryFnOnce for Fold<'_> {
             let Some(factor) = reflection(vector, &mut row[0]) else {
                 continue;
             };
-            let mut heads = row[1..].iter_mut();
-            for group in later.chunks_mut(TOGETHER * stride) {
-                if group.len() == TOGETHER * stride {
+            let groups = later.chunks_mut(TOGETHER * stride);
+            for (heads, group) in row[1..].chunks_mut(TOGETHER).zip(groups) {
+                if heads.len() == TOGETHER {
                     let (a, rest) = group.split_at_mut(stride);
                     let (b, rest) = rest.split_at_mut(stride);
                     let (c, d) = rest.split_at_mut(stride);
                     let group = [a, b, c, d].map(|column| &mut column[..rows]);
-                    reflect(vector, group, &mut heads, factor);
+                    reflect(vector, group, heads, factor);
                 } else {
-                    for column in group.chunks_mut(stride) {
-                        reflect(vector, [&mut column[..rows]], &mut heads, factor);
+                    for (head, column) in heads.chunks_mut(1).zip(group.chunks_mut(stride)) {
+                        reflect(vector, [&mut column[..rows]], head, factor);
                     }
                 }
             }
@@ -141,12 +141,12 @@ fn squares(x: &[f64]) -> f64 {
     sums.iter().copied().chain(rest).sum()
 }
 
-/// Applies a reflection to K columns and their heads, the next of `heads`.
+/// Applies a reflection to K columns and their K heads.
 #[inline(always)]
-fn reflect<'a, const K: usize>(
+fn reflect<const K: usize>(
     vector: &[f64],
     columns: [&mut [f64]; K],
-    heads: &mut impl Iterator<Item = &'a mut f64>,
+    heads: &mut [f64],
     factor: f64,
 ) {
     let (v, v_rest) = vector.as_chunks::<LANES>();
@@ -161,9 +161,9 @@ fn reflect<'a, const K: usize>(
         }
     }
     let mut along = [0.0; K];
-    for ((along, sum), (_, rest)) in along.iter_mut().zip(&sums).zip(&parts) {
+    let of_column = along.iter_mut().zip(heads).zip(sums.iter().zip(&parts));
+    for ((along, head), (sum, (_, rest))) in of_column {
         let rest = v_rest.iter().zip(&**rest).map(|(v, x)| v * x);
-        let Some(head) = heads.next() else { return };
         let product: f64 = sum.iter().copied().chain(rest).sum();
         *along = factor * (*head + product);
         *head -= *along;

@@ -77,6 +77,12 @@ impl<'a> Cases<'a> {
         self.all.iter().filter_map(|case| case.run)
     }
 
+    /// Median over the completed runs that have the number.
+    pub(super) fn median_completed(&self, of: impl Fn(&Summary) -> Option<f64>) -> Option<f64> {
+        let values = self.runs().filter(|run| completed(run)).filter_map(of);
+        median(&values.collect::<Vec<_>>())
+    }
+
     /// The seeds, each once.
     pub(super) fn seeds(&self) -> Vec<u64> {
         let mut seeds: Vec<u64> = self.all.iter().map(|case| case.seed).collect();

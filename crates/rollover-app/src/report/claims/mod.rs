@@ -27,15 +27,12 @@ const COSTS_AND_TIMES: &str = "Costs and times";
 /// What the campaign asks.
 pub const QUESTION: [&str; 3] = [
     "Does a controller that knows the vehicle only from a recorded drive keep it on its wheels where the driver alone rolls over, and does it keep its speed? How does a linear MPC on a model identified from the same recording do?",
-    "The claims are those of \u{201c}Model-free Vehicle Rollover Prevention: A Data-driven Predictive Control Approach\u{201d}. Its vehicles, roads and driver are not published; ours are calibrated so that its situations arise.",
-    "Every claim is judged twice: with the settings that we recommend (a limit on |LTR| with a margin and a larger weight \u{03bb}_g, chosen on recording seeds 0 to 9) and with the paper's as far as it gives them (`-paper`: limit 1, \u{03bb}_g = 100), on the course and on its mirror image. `floor` is the driver held at the lowest target speed: what a controller must beat in speed.",
+    "The claims are those of “Model-free Vehicle Rollover Prevention: A Data-driven Predictive Control Approach”. Its vehicles, roads and driver are not published; ours are calibrated so that its situations arise.",
+    "Every claim is judged twice: with the settings that we recommend (a limit on |LTR| with a margin and a larger weight λ_g, chosen on recording seeds 0 to 9) and with the paper's as far as it gives them (`-paper`: limit 1, λ_g = 100), on the course and on its mirror image. `floor` is the driver held at the lowest target speed: what a controller must beat in speed.",
 ];
 
 /// How a verdict is found.
 pub const RULE: &str = "A claim is `reproduced` where it holds in at least 80 % of the judged runs, `partly` in at least 20 %, else `not reproduced`. Completed means: neither rolled over nor spun out, and never farther from the path than half the road's width. Safe means: completed with |LTR| never above 1.";
-
-/// Said of the driver.
-const ONE_RUN: &str = "; nothing is random about it: a course is driven once, and its mirror image";
 
 /// A speed is near a bound within this distance, km/h.
 const NEAR_KMH: f64 = 2.0;
@@ -48,7 +45,7 @@ const FASTER: f64 = 5.0;
 #[must_use]
 pub fn judge(campaign: &Campaign) -> Vec<Claim> {
     let judge = Judge { campaign };
-    let mut claims = vec![judge.driver(), judge.driver_before()];
+    let mut claims = Vec::from(judge.drivers());
     for settings in [Settings::Recommended, Settings::Paper] {
         claims.extend(judge.sedan(settings));
     }
@@ -152,34 +149,42 @@ impl<'a> Judge<'a> {
         })
     }
 
-    fn driver(&self) -> Option<Claim> {
-        let words = Words {
-            id: "s1-driver".into(),
-            group: group("s1-driver"),
-            settings: None,
-            claim: "The driver alone rolls over in the last turn.".into(),
-            paper: "rolls over in the last turn",
-        };
-        let cases = self.cases(SEDAN, "driver");
-        let mut claim = self.single(words, &cases, rolled_over_in_the_last_turn)?;
-        claim.ours += ONE_RUN;
-        Some(claim)
+    fn drivers(&self) -> [Option<Claim>; 2] {
+        [
+            self.driver(
+                "s1-driver",
+                "The driver alone rolls over in the last turn.",
+                "rolls over in the last turn",
+                rolled_over_in_the_last_turn,
+            ),
+            self.driver(
+                "s1-driver-before",
+                "The driver alone exceeds the limit on LTR before the last turn as well.",
+                "violates the limit on LTR several times",
+                |run| {
+                    let turn = run.course.violation_first_turn;
+                    turn.is_some_and(|turn| turn < run.course.turns)
+                },
+            ),
+        ]
     }
 
-    fn driver_before(&self) -> Option<Claim> {
+    fn driver(
+        &self,
+        id: &str,
+        claim: &str,
+        paper: &'static str,
+        holds: fn(&Summary) -> bool,
+    ) -> Option<Claim> {
         let words = Words {
-            id: "s1-driver-before".into(),
-            group: group("s1-driver-before"),
+            id: id.into(),
+            group: group(id),
             settings: None,
-            claim: "The driver alone exceeds the limit on LTR before the last turn as well.".into(),
-            paper: "violates the limit on LTR several times",
+            claim: claim.into(),
+            paper,
         };
-        let cases = self.cases(SEDAN, "driver");
-        let mut claim = self.single(words, &cases, |run| {
-            let turn = run.course.violation_first_turn;
-            turn.is_some_and(|turn| turn < run.course.turns)
-        })?;
-        claim.ours += ONE_RUN;
+        let mut claim = self.single(words, &self.cases(SEDAN, "driver"), holds)?;
+        claim.ours += "; nothing is random about it: a course is driven once, and its mirror image";
         Some(claim)
     }
 

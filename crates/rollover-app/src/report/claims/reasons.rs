@@ -81,11 +81,11 @@ fn margin(campaign: &Campaign, cases: &Cases<'_>) -> Option<Reason> {
 /// Where the costs come from, in the runs that are completed.
 fn costs(campaign: &Campaign, cases: &Cases<'_>) -> Option<Reason> {
     let parts = |cases: &Cases<'_>| {
-        let completed = || cases.runs().filter(|run| completed(run));
-        let speed = completed().filter_map(|run| run.cost_of_target_speed);
-        let steering = completed().filter_map(|run| Some(run.cost? - run.cost_of_target_speed?));
-        let middle = |values: Vec<f64>| median(&values);
-        Some((middle(steering.collect())?, middle(speed.collect())?))
+        let steering = |run: &Summary| Some(run.cost? - run.cost_of_target_speed?);
+        Some((
+            cases.median_completed(steering)?,
+            cases.median_completed(|run| run.cost_of_target_speed)?,
+        ))
     };
     let theirs = Cases::new(campaign, cases.scenario, LMPC);
     let ((steering, speed), (their_steering, their_speed)) = (parts(cases)?, parts(&theirs)?);
@@ -99,13 +99,9 @@ fn costs(campaign: &Campaign, cases: &Cases<'_>) -> Option<Reason> {
 /// What the lowest target speed alone does.
 fn slowing_down(campaign: &Campaign, cases: &Cases<'_>) -> Option<Reason> {
     let floor = Cases::new(campaign, cases.scenario, FLOOR);
-    let middle = |cases: &Cases<'_>, of: fn(&Summary) -> f64| {
-        let values: Vec<f64> = cases.runs().filter(|r| completed(r)).map(of).collect();
-        median(&values)
-    };
-    let ltr = |run: &Summary| run.ltr_abs_max;
-    let on_two_wheels = middle(cases, |run| run.measures.two_wheel_lift_s)?;
-    let (ours, floors) = (middle(cases, ltr)?, middle(&floor, ltr)?);
+    let on_two_wheels = cases.median_completed(|run| Some(run.measures.two_wheel_lift_s))?;
+    let ltr = |run: &Summary| Some(run.ltr_abs_max);
+    let (ours, floors) = (cases.median_completed(ltr)?, floor.median_completed(ltr)?);
     let text = format!(
         "{} complete, but they drive on two wheels for {on_two_wheels:.1} s, with a largest |LTR| of {ours:.3}, in the median. The driver held at the lowest target speed ({FLOOR}) stays at {floors:.3}. Slowing down would do, but the data do not tell that it helps: the target speed moves by {} km/h in the median.",
         cases.count(completed),
